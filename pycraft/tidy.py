@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import json
 import math
@@ -43,6 +44,12 @@ class TidyTable:
 
     def __getitem__(self, index: int) -> dict[str, Any]:
         return self.rows[index]
+
+    def part(self, rows: list[dict[str, Any]]) -> Any:
+        """The same table with some of its rows."""
+        other = copy.copy(self)
+        other.rows = list(rows)
+        return other
 
     # ------------------------------------------------------------------ ways out
     def to_pandas(self) -> Any:
@@ -147,14 +154,17 @@ class TidyTable:
         return "\n".join(line.rstrip() for line in console.file.getvalue().rstrip().split("\n"))  # type: ignore[attr-defined]  # a StringIO
 
     def _repr_html_(self) -> str:
+        last = len(self.shown) - 1
+        kept = ["text-align:left;white-space:" + ("nowrap" if 0 < i < last else "normal") for i in range(last + 1)]  # numbers in one piece
         head = "".join(f"<th style='text-align:left'>{escape(heading)}</th>" for heading in self.shown.values())
         body = "".join(
             f"<tr style='{'font-weight:bold' if 'bold' in self.style(row) else ''}'>"
-            + "".join(f"<td style='text-align:left'>{escape(self.cell(key, row))}</td>" for key in self.shown)
+            + "".join(f"<td style='{style}'>{escape(self.cell(key, row))}</td>" for key, style in zip(self.shown, kept, strict=True))
             + "</tr>"
             for row in self.rows
         )
-        return f"<p><b>{escape(self.title)}</b></p><table style='font-size:85%'><tr>{head}</tr>{body}</table>"
+        table = f"<table style='font-size:85%;table-layout:auto'><tr>{head}</tr>{body}</table>"
+        return f"<p><b>{escape(self.title)}</b></p><div style='overflow-x:auto'>{table}</div>"
 
 
 def terminal_width() -> int:

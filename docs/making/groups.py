@@ -28,7 +28,7 @@ MULTIBODY = {
     "fixman_torque dof_shares",
     "Loops": (
         "loops add_loop add_coupling add_curve add_rolling add_surface assemble assembly_branches mobility "
-        "mobility_along constrained_dynamics constrained_velocities"
+        "mobility_along constrained_dynamics constrained_velocities constrained_inverse_dynamics constrained_inverse_dynamics_derivatives"
     ),
     "Change the structure": (
         "attach detach reattach reroot rerootings merge copy_subtree remove_body prune lock unlock locked coalesce coalesced split"

@@ -202,6 +202,9 @@ def _write(table: Any, csv: Path | None, json: Path | None, plot: Path | None) -
         axes = table.plot()
         figure = axes.figure if hasattr(axes, "figure") else axes[0].figure
         figure.savefig(plot, dpi=150, bbox_inches="tight")
+    for path in (csv, json, plot):
+        if path:
+            note(f"wrote {path}")
 
 
 @app.command()
@@ -215,6 +218,7 @@ def accuracy(
     seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 0.05,
     duration: Annotated[float | None, typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the states and forces.")] = 0,
+    front: Annotated[bool, typer.Option("--front", help="Print the Pareto front alone.")] = False,
     csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
@@ -237,6 +241,8 @@ def accuracy(
         fail("--form and --precision belong to the table of forms; --integration has --method, an integrator")
     if duration is not None and not integration:
         fail("--duration belongs to --integration")
+    if front and integration:
+        fail("--front belongs to the table of forms")
     notes = []
 
     def run() -> Any:
@@ -268,7 +274,7 @@ def accuracy(
             )
 
     table = run()
-    console.print(table.table(console.width))
+    console.print((table.part(table.front) if front else table).table(console.width))
     if integration:
         notes.append(f"reference: {table.reference}; its own error {table.reference_error:.1e}")
     for text in notes:
@@ -276,9 +282,6 @@ def accuracy(
     for reason, labels in table.refusals.items():
         console.print(f"[bold]refused:[/] {escape('; '.join(labels))}: {escape(reason)}", highlight=False)
     _write(table, csv, json, plot)
-    for path in (csv, json, plot):
-        if path:
-            note(f"wrote {path}")
     if all(row["refused"] for row in table):
         fail("every row is refused", 1)
     if error is not None:

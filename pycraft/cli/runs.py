@@ -13,6 +13,9 @@ from .terminal import console, diagnostics, fail, note
 
 SHOWN = 500
 """States that are kept where --every is left out."""
+_SHOWN_BY = {".html": "to_html", ".glb": "to_gltf", ".gltf": "to_gltf", ".usda": "to_usd", ".usdc": "to_usd", ".usd": "to_usd"}
+"""By a file's ending, what writes a run to be looked at."""
+_WRITTEN = "Write the run: .nc (NetCDF), .parquet or .csv; to be looked at: .html, .glb or .gltf (glTF), .usda, .usdc or .usd."
 
 
 FromModel = Annotated[
@@ -36,7 +39,7 @@ def add_offered(scene: Any, wanted: bool) -> None:
 
 def run(
     what: Annotated[str, typer.Argument(help="A scene's TOML file; a model's file, a robot or a mechanism by name (pycraft.mechanisms).")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .nc (NetCDF), .parquet or .csv.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help=_WRITTEN)] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(help="Add an effect: gravity, damping:0.1, spring:2,rest=0.1,hinges=arm_*; may be repeated."),
@@ -88,19 +91,28 @@ def run(
     found = _simulated(scene, dict(options), output)
     console.print(_told(scene, found), markup=False, highlight=False)
     if output is not None:
-        found.save(output)
+        _write(found, output)
         note(f"wrote {output}")
     if picture is not None:
         _draw(found, picture)
 
 
 def _check_output(path: Path) -> None:
+    from ..scenes.run_gltf import checked_gltf
+    from ..scenes.run_page import checked_page
+    from ..scenes.run_usd import checked_usd
     from ..scenes.runs_on_disk import checked_output
 
+    checks = {"to_html": checked_page, "to_gltf": checked_gltf, "to_usd": checked_usd}
     try:
-        checked_output(path)
+        checks.get(_SHOWN_BY.get(path.suffix, ""), checked_output)(path)
     except (OSError, ImportError) as error:
         fail(str(error))
+
+
+def _write(run: Any, path: Path) -> None:
+    """The run as a file, by its ending."""
+    getattr(run, _SHOWN_BY.get(path.suffix, "save"))(path)
 
 
 def loaded_scene(what: str, root: str | None, mimic: str) -> Any:
@@ -135,7 +147,7 @@ def _simulated(scene: Any, options: dict[str, Any], output: Path | None) -> Any:
     except (Exception, KeyboardInterrupt) as error:
         before = getattr(error, "run", None)
         if output is not None and before is not None and len(before):
-            before.save(output)
+            _write(before, output)
             note(f"wrote {output}, as far as it had come: to {before.t[-1]:g} s")
         raise
 

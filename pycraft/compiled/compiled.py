@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import copyreg
 import pickle
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -40,6 +41,8 @@ class Compiled:
     operations : how many a state takes: sums, products, quotients, a sine as one
     """
 
+    _again: Callable[[], tuple[Any, ...]]
+
     def __init__(self, name: str, graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, int]], ordinary: Callable[..., Any]):
         size = len(graph.needed(results.ravel().tolist()))
         if size > MOST_OPERATIONS or results.size > MOST_RESULTS:
@@ -62,14 +65,25 @@ class Compiled:
             )
         return self._ordinary(*given, out=out)
 
+    def __reduce__(self):
+        return self._again()
+
     def __repr__(self) -> str:
         return f"<compiled {self.name}({', '.join(self.arguments)}), {self.operations} operations>"
 
 
-def _callable(behind: Compiled, arguments: Sequence[tuple[str, int]]) -> Any:
+def _callable(behind: Compiled, arguments: Sequence[tuple[str, int]], again: Callable[[], tuple[Any, ...]]) -> Any:
+    """again: how it is copied and pickled, a function and its arguments; where the library was built before, it is loaded."""
+    behind._again = again
     if 0 in behind.shape:
         return behind  # nothing to compute
-    return _core.compiled_call(behind, str(behind.library), FUNCTION, [n for _, n in arguments], list(behind.shape), behind.operations)
+    made = _core.compiled_call(behind, str(behind.library), FUNCTION, [n for _, n in arguments], list(behind.shape), behind.operations)
+    copyreg.pickle(type(made), _told)
+    return made
+
+
+def _told(call: Any) -> Any:
+    return call._again()
 
 
 def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
@@ -95,7 +109,9 @@ def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
         ordinary, name = partial(_of_frame, held, call, frame), f"{call} of {frame}"
     inputs = INPUTS["forward_dynamics"] if call == ON_LOOPS else INPUTS.get(call, ("q",))
     arguments = [(a, held.nq if a == "q" else held.nv) for a in inputs]
-    return _callable(Compiled(f"{held.name}: {name}", graph, results, arguments, ordinary), arguments)
+    return _callable(
+        Compiled(f"{held.name}: {name}", graph, results, arguments, ordinary), arguments, lambda: (compile_call, (held, call, frame))
+    )
 
 
 def _on_loops(model: Any, q: Any, v: Any, tau: Any, out: Any = None) -> Any:
@@ -117,9 +133,15 @@ def _of_frame(model: Any, call: str, frame: str, q: Any, out: Any = None) -> Any
 def compile_expression(expression: Any, request: str = "apply") -> Any:
     """What `Operator.compile` and `Scalar.compile` give."""
     made = ExpressionGraph(expression, request)
-    ordinary = partial(_evaluated, expression, request, made, _numbers_of(made.model))
+    numbers = _numbers_of(made.model)
+    ordinary = partial(_evaluated, expression, request, made, numbers)
+
+    def again() -> tuple[Any, ...]:
+        _check_edits(expression, made, numbers)
+        return compile_expression, (expression, request)
+
     name = expression.text() if request == "apply" else f"{request} of {expression.text()}"
-    return _callable(Compiled(name, made.graph, made.results, made.arguments, ordinary), made.arguments)
+    return _callable(Compiled(name, made.graph, made.results, made.arguments, ordinary), made.arguments, again)
 
 
 def _numbers_of(model: Any) -> bytes:
@@ -127,10 +149,14 @@ def _numbers_of(model: Any) -> bytes:
     return b"" if model is None else pickle.dumps({k: v for k, v in describe(model).items() if k not in ("q", "v")})
 
 
-def _evaluated(expression: Any, request: str, made: ExpressionGraph, numbers: bytes, *given: Any, out: Any = None) -> Any:
-    """The expression at states, one after another, by its plan."""
+def _check_edits(expression: Any, made: ExpressionGraph, numbers: bytes) -> None:
     if made.model is not None and _numbers_of(made.model) != numbers:
         raise _core.EvaluationError(f"{made.model.name!r} was edited after {expression.text()} was compiled: compile it again")
+
+
+def _evaluated(expression: Any, request: str, made: ExpressionGraph, numbers: bytes, *given: Any, out: Any = None) -> Any:
+    """The expression at states, one after another, by its plan."""
+    _check_edits(expression, made, numbers)
     names, shape = [name for name, _ in made.arguments], made.results.shape
     arrays = dict(zip(names, (np.asarray(a, float) for a in given), strict=True))
     batches = {len(a) for a in arrays.values() if a.ndim == 2}

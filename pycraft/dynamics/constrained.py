@@ -105,8 +105,8 @@ class ConstrainedCalls:
         alpha, beta : float, 1/s
             Baumgarte's: r̈ + 2α ṙ + β² r = 0, of rows of velocities ṙ alone; by "augment".
         independent : names of coordinates or hinges, by "embed"
-            Around loops that hang together as many as are free, or none of them: then they are chosen at each state, by complete pivoting
-            in units of energy.
+            Around loops that hang together as many as are free, or none of them (None, an empty list): then they are chosen at each
+            state, by complete pivoting in units of energy.
 
         Returns
         -------
@@ -158,11 +158,11 @@ class ConstrainedCalls:
             _check_embedding(form, residual, *numbers)
             numbers_of = independent_numbers(self, independent) or []
             given = self.loops._core.embedded_accelerations(q, v, tau, *pushes, numbers_of, refine, precision)
-            return ConstrainedDynamics(*_by_loop(self.loops, *given))
+            return ConstrainedDynamics(*by_loop(self.loops, *given))
         if independent is not None:
             raise _core.EvaluationError("independent= is of method='embed'; method='augment' has no independent coordinates")
         given = self.loops._core.accelerations(q, v, tau, *pushes, form, refine, chosen(residual, "residual"), precision, *numbers)
-        return ConstrainedDynamics(*_by_loop(self.loops, *given))
+        return ConstrainedDynamics(*by_loop(self.loops, *given))
 
     def constrained_velocities(
         self, q=None, v=None, impulse=None, *, form: str = "fast", precision: str = "double"
@@ -188,7 +188,7 @@ class ConstrainedCalls:
         """
         q, v = at_state(self, q, v)
         impulse = np.zeros(self.nv) if impulse is None else impulse
-        return ConstrainedVelocities(*_by_loop(self.loops, *self.loops._core.velocities(q, v, impulse, form, precision)))
+        return ConstrainedVelocities(*by_loop(self.loops, *self.loops._core.velocities(q, v, impulse, form, precision)))
 
 
 def _check_embedding(form: str, residual: str, alpha: float, beta: float) -> None:
@@ -242,8 +242,9 @@ class _Forces(_OfLoops):
         return LoopForce(self._forces[..., place, 0, :], self._forces[..., place, 1, :])
 
 
-def _by_loop(
+def by_loop(
     loops: Any, x: np.ndarray, multipliers: np.ndarray, forces: np.ndarray, rank: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, Mapping[str, np.ndarray], Mapping[str, LoopForce], np.ndarray]:  # fmt: skip
+    """What the core gives of all loops, and of multipliers and forces each loop's own by name."""
     places, first = loops.numbered()
     return x, multipliers, _Multipliers(places, first, multipliers), _Forces(places, forces), rank

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +13,7 @@ from ..arguments import chosen, text
 from ..state import at_state
 from .by_realization import by_realization, output
 from .jacobians import resolved_jacobian
-from .prepared import direct, prepared
+from .prepared import direct, prepared, told
 from .threads import over_threads
 
 
@@ -349,3 +350,6 @@ class DirectCalls:
         """
         q = _core.real_array(at_state(self, q)[0], "q")
         return self._calls().energy(q, np.zeros((*q.shape[:-1], self.nv)), datum)[..., 1]
+
+
+copyreg.pickle(type(vars(DirectCalls)["forward_dynamics"]), told)

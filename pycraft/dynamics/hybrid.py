@@ -10,6 +10,7 @@ import numpy as np
 from .. import _core
 from ..arguments import chosen, several, text
 from ..state import at_state
+from .cholesky import cholesky
 from .prepared_states import refuse_other_states
 from .threads import over_threads
 
@@ -70,32 +71,34 @@ def hybrid_of(model: Any, prescribed: Any) -> _core.HybridDynamics:
     return kept[key]
 
 
-def prepared_hybrid(model: Any, states: int | None, options: dict[str, Any]) -> Callable[..., HybridMotion]:
-    """What `Multibody.prepare` gives of hybrid dynamics; options are those of the call."""
-    defaults: dict[str, Any] = {"prescribed": (), "form": "fast", "refine": 0, "residual": "same", "precision": "double"}
-    options = defaults | options
-    options["prescribed"] = prescribed_names(options["prescribed"])  # once, as what is listed may be gone then
+class PreparedHybrid:
+    """What `Multibody.prepare` gives of hybrid dynamics; options are those of the call. It copies and pickles with its model."""
 
-    def made() -> _core.PreparedHybridDynamics:
-        how = {name: options[name] for name in HYBRID_OPTIONS[1:]}
-        return hybrid_of(model, options["prescribed"]).prepared(**how, states=-1 if states is None else states)
+    def __init__(self, model: Any, states: int | None, options: dict[str, Any]):
+        defaults: dict[str, Any] = {"prescribed": (), "form": "fast", "refine": 0, "residual": "same", "precision": "double"}
+        self._model, self._states, self._options = model, states, defaults | options
+        self._options["prescribed"] = prescribed_names(self._options["prescribed"])  # once, as what is listed may be gone then
+        self._ready = self._made()
+        self.__name__ = self.__qualname__ = "prepared_hybrid_dynamics"
+        each = "one state" if states is None else f"{states} states"
+        self.__doc__ = f"hybrid_dynamics(q, v, tau, vdot) of '{model.name}', {each} a call."
 
-    ready = [made()]
+    def _made(self) -> _core.PreparedHybridDynamics:
+        how = {name: self._options[name] for name in HYBRID_OPTIONS[1:]}
+        return hybrid_of(self._model, self._options["prescribed"]).prepared(**how, states=-1 if self._states is None else self._states)
 
-    def call(*given: Any) -> HybridMotion:
+    def __call__(self, *given: Any) -> HybridMotion:
         if len(given) != 4:
             raise TypeError(f"a prepared hybrid_dynamics takes q, v, tau, vdot; it was given {len(given)} arguments")
-        found = ready[0](*given)
+        found = self._ready(*given)
         if found is None:
-            refuse_other_states("hybrid_dynamics", states, given)
-            ready[0] = made()  # of the model as it is now
-            return model.hybrid_dynamics(*given, **options)
+            refuse_other_states("hybrid_dynamics", self._states, given)
+            self._ready = self._made()  # of the model as it is now
+            return self._model.hybrid_dynamics(*given, **self._options)
         return HybridMotion._make(found)
 
-    call.__name__ = call.__qualname__ = "prepared_hybrid_dynamics"
-    each = "one state" if states is None else f"{states} states"
-    call.__doc__ = f"hybrid_dynamics(q, v, tau, vdot) of '{model.name}', {each} a call."
-    return call
+    def __reduce__(self):
+        return PreparedHybrid, (self._model, self._states, self._options)
 
 
 class HybridCalls:
@@ -181,12 +184,7 @@ def _derivatives(T_q: np.ndarray, T_v: np.ndarray, mass: np.ndarray, held: np.nd
         all_coordinates = np.arange(shape[-1])
         sides = [T_q[..., f[:, None], all_coordinates], T_v[..., f[:, None], all_coordinates], mass[columns]]
         unit = np.broadcast_to(-np.eye(len(f)), (*shape[:-2], len(f), len(f)))
-        try:
-            lower = np.linalg.cholesky(mass[rows])
-        except np.linalg.LinAlgError:
-            raise _core.SingularOperatorError(
-                "the mass matrix of the free coordinates is not positive definite to rounding, and its Cholesky factor does not exist"
-            ) from None
+        lower = cholesky(mass[rows], "the mass matrix of the free coordinates", "its Cholesky factor does not exist")
         solved = -np.linalg.solve(np.swapaxes(lower, -1, -2), np.linalg.solve(lower, np.concatenate([*sides, unit], axis=-1)))
         n = shape[-1]
         found["vdot_q"][..., f, :] = solved[..., :n]

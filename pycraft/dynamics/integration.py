@@ -16,6 +16,7 @@ from .hybrid import HybridCalls
 from .identification import IdentificationCalls
 from .integrator_names import IntegratorName, integrator_named
 from .interbody import InterbodyCalls
+from .inverse_on_loops import ConstrainedInverseCalls
 from .quadratic import QuadraticCalls
 from .statics import StaticsCalls
 from .statistical import StatisticalCalls
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 class IntegrationCalls(
     CentroidalCalls,
     ConstrainedCalls,
+    ConstrainedInverseCalls,
     HybridCalls,
     IdentificationCalls,
     InterbodyCalls,

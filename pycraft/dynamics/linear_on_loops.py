@@ -16,13 +16,13 @@ FAR, STOPPED = 1e-6, 1e-13
 
 
 def independent_numbers(model: Any, names: Any) -> list[int] | None:
-    """Numbers of coordinates, in the order of these names; None where they are to be chosen."""
+    """Numbers of coordinates, in the order of these names; None where they are to be chosen: none are named, by None or an empty list."""
     if names is None:
         return None
     found = [j for name in listed(names, "independent") for j in _core.coordinates_named(model, [name], "independent")]
     if len(set(found)) < len(found):
         raise _core.ModelError(f"independent: {[model.coordinate_names[j] for j in found]} has a coordinate twice")
-    return found
+    return found or None
 
 
 def linear_model_on_loops(

@@ -50,7 +50,8 @@ class LinearizationCalls:
         loops : whether the loops are kept: of `constrained_dynamics`, at a state on them, in independent coordinates (docs/loops.md)
             States are then the displacements and velocities of as many coordinates as there are freedoms; where rows are of velocities
             (rolling), of more displacements than velocities.
-        independent : names of the coordinates whose displacements are states, with loops=True; None: those that tell the others best
+        independent : names of the coordinates whose displacements are states, with loops=True; None or an empty list: those that
+            tell the others best
 
         Returns
         -------

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..state import at_state
 from .by_realization import output
 from .direct_calls import DirectCalls
 from .prepared import direct
-from .task_space import TWIST, told
+from .task_space import TWIST, damping_of, told
 from .threads import over_threads
 
 
@@ -24,14 +24,18 @@ class OperationalSpaceCalls(DirectCalls):
     @direct
     @over_threads
     def operational_space_inertia(
-        self, frame: str | Sequence[str], q=None, *, form: str = "fast", precision: str | int = "double", threads: int = 1, out=None
-    ) -> np.ndarray:
+        self, frame: str | Sequence[str], q=None, *, form: str = "fast", precision: str | int = "double", on_singular: str = "raise",
+        damping: float = 0.02, threads: int = 1, out=None,
+    ) -> np.ndarray:  # fmt: skip
         """Λ = (B*ΩB)⁻¹ = (𝒥(ℳ + J)⁻¹𝒥*)⁻¹ of bodies or nodes, by name: what resists accelerations there, (6, 6) or (B, 6, 6).
 
         In each frame's own axes about its origin, angular first, as `jacobian` has it; of m names (6 m, 6 m), in their order. One sweep
         over all bodies and one along the way from each frame to the base: O(N + m² depth). `soa.Lambda(frame)` is the same as an
         operator, and with directions= that of fewer directions. `form` is that of the sweep: in other forms and
         precisions than these the operators compute it, and so they do where kernels are not sure, near singular poses.
+
+        on_singular, damping : what becomes of states at which the frames cannot move in every direction, as in `task_space`: "raise"
+        refuses them by number, "nan" has NaN there, "damped" the damped inertia of the task space at every state, in "fast" and double.
 
         SingularOperatorError where the frames cannot move in every direction, as of an arm of fewer than six hinges, with those directions;
         SingularHingeError as in forward_dynamics; ModelError where no body or node has the name, or where it is fixed to the base.
@@ -44,7 +48,10 @@ class OperationalSpaceCalls(DirectCalls):
         >>> body.operational_space_inertia("body").diagonal().tolist()  # nothing but its own
         [1.0, 2.0, 3.0, 2.0, 2.0, 2.0]
         """
-        return _of_frames(self, True, frame, at_state(self, q)[0], form, precision, out)
+        q, _ = at_state(self, q)
+        if damping_of(on_singular, damping) is not None:
+            return _damped(self, frame, q, form, precision, damping, out)
+        return _of_frames(self, True, frame, q, form, precision, out, on_singular == "nan")
 
     @direct
     @over_threads
@@ -64,40 +71,57 @@ class OperationalSpaceCalls(DirectCalls):
         return _of_frames(self, False, frame, at_state(self, q)[0], form, precision, out)
 
 
-def _of_frames(model: Any, inverse: bool, frame: Any, q: Any, form: str, precision: str | int, out: Any) -> np.ndarray:
+def _of_frames(
+    model: Any, inverse: bool, frame: Any, q: Any, form: str, precision: str | int, out: Any, masked: bool = False
+) -> np.ndarray:  # fmt: skip
     """By kernels, or where they are not sure or know no such precision, by the operators, which say what is singular."""
     names = [text(name, "a frame") for name in several(frame)]
     form, plain = chosen(form, "form"), isinstance(precision, str) and precision == "double"
     kernel = model._calls().operational_space if plain and form == "fast" else None
     result = kernel(inverse, names, q) if kernel else None
     if result is None:
-        try:
-            by_operators = _operator(model.soa, inverse, names)
-            result = _each_by_itself(functools.partial(kernel, inverse, names), by_operators, q) if kernel else None
-            if result is None:
-                result = by_operators.at(q, form=form, precision=precision).dense()
-        except _core.SingularOperatorError as error:
-            raise _core.SingularOperatorError(f"{error}{_what_does_not_move(model, names, q)}") from None
+        by_operators = _operator(model.soa, inverse, names)
+        if not kernel:
+            with suppress(_core.SingularOperatorError):  # whichever state it is of is told below
+                return _written(by_operators.at(q, form=form, precision=precision).dense(), out)
+
+        def one(state: np.ndarray, told: str = "") -> np.ndarray:
+            found = kernel(inverse, names, state) if kernel else None  # each state as it is alone, whatever states are beside it
+            if found is not None:
+                return found
+            try:
+                return np.asarray(by_operators.at(state, form=form, precision=precision).dense())
+            except _core.SingularOperatorError as error:
+                if masked:
+                    return np.full((6 * len(names), 6 * len(names)), np.nan)
+                said = f"{error}{told}{_what_does_not_move(model, names, state)}"
+                more = "; on_singular='nan' or 'damped' goes on with the others" if told and inverse else ""
+                raise _core.SingularOperatorError(said + more) from None
+            except _core.Error as error:
+                raise type(error)(f"{error}{told}") from None
+
+        states = np.asarray(q, float)
+        if not len(states):
+            return _written(by_operators.at(q, form=form, precision=precision).dense(), out)
+        several_states = len(states) if states.ndim == 2 else 1
+        each = [one(x, f" (state {i} of a batch of {several_states})" * (several_states > 1)) for i, x in enumerate(np.atleast_2d(states))]
+        result = np.stack(each) if states.ndim == 2 else each[0]
+    return _written(result, out)
+
+
+def _damped(model: Any, frame: Any, q: Any, form: str, precision: str | int, damping: float, out: Any) -> np.ndarray:
+    if chosen(form, "form") != "fast" or not isinstance(precision, str) or precision != "double":
+        raise _core.EvaluationError("on_singular='damped' is by the task space, in form 'fast' and double precision; leave them out")
+    names = [text(name, "a frame") for name in several(frame)]
+    return _written(model.task_space(names, q, on_singular="damped", damping=damping).inertia, out)
+
+
+def _written(result: np.ndarray, out: Any) -> np.ndarray:
     if out is None:
         return result
     out = output(out, result.shape)
     out[...] = result
     return out
-
-
-def _each_by_itself(kernel: Any, by_operators: Any, q: Any) -> np.ndarray | None:
-    """Of a batch in some of whose states the kernel is sure: each state as it is alone, whatever states are beside it. Else None."""
-    states = np.asarray(q, float)
-    found = [kernel(one) for one in states] if states.ndim == 2 and len(states) > 1 else []
-    if all(one is None for one in found):
-        return None
-    for i, one in enumerate(found):
-        if one is None:
-            try:
-                found[i] = by_operators.at(states[i]).dense()
-            except _core.Error as error:
-                raise type(error)(f"{error} (state {i} of a batch of {len(found)})") from None
-    return np.stack(found)
 
 
 def _what_does_not_move(model: Any, names: list[str], q: Any) -> str:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from .. import _core
 from ..arguments import chosen, text
 from .by_realization import output
-from .hybrid import HYBRID_OPTIONS, prepared_hybrid
+from .hybrid import HYBRID_OPTIONS, PreparedHybrid
 from .prepared_states import refuse_other_states, states_of
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -46,7 +46,7 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
             chosen(options[name], name)
     batch = states_of(batch)
     if call == "hybrid_dynamics":
-        return prepared_hybrid(model, batch, options)
+        return PreparedHybrid(model, batch, options)
     frame = []
     if "frame" in known:
         if "frame" not in options:
@@ -76,4 +76,15 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
     takes = ", ".join(arrays) + ("" if call in _MADE else ", *, out=None")
     each = "one state" if batch is None else f"{batch} states"
     call_with_other_arguments.__doc__ = f"{call}({takes}) of '{model.name}', {each} a call."
+    vars(call_with_other_arguments)["prepared"] = model, call, batch, dict(options)
     return _core.prepared_call(call_with_other_arguments, call, model._calls(), batch, _MADE.get(call), **options)
+
+
+def told(call: Any) -> Any:
+    """How a direct call is pickled and copied: a prepared one by what it was prepared with, a method by its name."""
+    made = vars(call.__wrapped__).get("prepared")
+    return call.__qualname__ if made is None else (_again, made)
+
+
+def _again(model: Any, call: str, batch: int | None, options: dict[str, Any]) -> Callable[..., Any]:
+    return model.prepare(call, batch=batch, **options)

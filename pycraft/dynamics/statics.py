@@ -10,18 +10,18 @@ import numpy as np
 from .. import _core
 from ..arguments import switch
 from ..state import at_state
-from .equilibrium import TOLERANCE, Balance, Equilibrium, checked_tolerance, solved
+from .equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from .equilibrium_on_loops import solved_on_loops
 from .hybrid import prescribed_names
 from .interbody import pushed
-from .linearization import listed
+from .inverse_on_loops import actuated_coordinates, beyond, check_on_loops, shared_out
 
 
 class Counterbalance(NamedTuple):
     """Forces that hold a model at rest.
 
     tau : (nv,) or (B, nv) N m and N, zero where nothing is actuated
-    residual : likewise, what is left at the others: the least that any forces of these actuators leave
+    residual : likewise, what is left at the others: the least that any forces of these actuators leave, and of the loops
     unbalanced : names of coordinates at which something is left, beyond rounding, at any of the states
     """
 
@@ -124,19 +124,24 @@ class StaticsCalls:
 
     def counterbalance(
         self, q=None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", actuated: Any = None,
-        tolerance: float = TOLERANCE,
+        tolerance: float = TOLERANCE, loops: bool | None = None,
     ) -> Counterbalance:  # fmt: skip
         """The generalized forces that hold the model at rest against gravity and wrenches, T(q, 0, 0): O(N).
+
+        Of a model with loops τ + Q*λ = T: the loops carry what they can, and τ is of the least Σ τ² where several forces hold it.
+        `constrained_inverse_dynamics` at rest has λ beside τ.
 
         Parameters
         ----------
         q : (nq,) or (B, nq), or a State; the model's present one where left out
         wrenches, wrench_axes : as in `interbody_forces`
         actuated : names of hinges, coordinates or patterns, or a list of them, that can be driven; None: all
-            A force at one coordinate balances no other, so that what the others need is left.
+            A force at one coordinate balances no other but through loops, so that what the others need is left.
         tolerance : what may be left, as a part of the largest force
+        loops : whether the loops carry their part, at a q on them; None: where the model has some. False: forces of the tree alone.
 
-        Raises ModelError for names that are not there, EvaluationError for a tolerance that is none, and as `interbody_forces`.
+        Raises ModelError for names that are not there and a q that is off the loops, by the row, EvaluationError for a tolerance that is
+        none, and as `interbody_forces`.
 
         Examples
         --------
@@ -152,16 +157,14 @@ class StaticsCalls:
         q, _ = at_state(model, q)
         still, (names, in_world, numbers) = np.zeros(self.nv), pushed(wrenches, wrench_axes)
         f, _, needed, _ = model._interbody().after(q, still, still, names, in_world, numbers, False, "double")
-        driven = np.zeros(self.nv, bool)
-        chosen = None if actuated is None else listed(actuated, "actuated")
-        driven[_core.coordinates_named(model, chosen, "actuated") if chosen is not None else slice(None)] = True
-        left = np.where(driven, 0.0, needed)
-        weight = model.mass * float(np.linalg.norm(model.gravity))  # what balances, where hinges carry nothing
-        pushes = np.abs(numbers).max(initial=0.0, axis=(-2, -1))
-        size = np.maximum(np.abs(f).max(initial=0.0, axis=(-2, -1)), np.maximum(weight, pushes))[..., None]
-        beyond = np.abs(left) > checked_tolerance(tolerance) * size
-        beyond = beyond.any(axis=tuple(range(beyond.ndim - 1)))
-        return Counterbalance(np.where(driven, needed, 0.0), left, tuple(model.coordinate_names[j] for j in np.flatnonzero(beyond)))
+        driven = actuated_coordinates(model, actuated)
+        keep = bool(model.loops.rows) if loops is None else switch(loops, "loops")
+        if keep:
+            check_on_loops(model, np.asarray(_core.real_array(q, "q"), float))
+            tau, left = shared_out(model.loops.jacobian(q), needed, driven)[:2]
+        else:
+            tau, left = np.where(driven, needed, 0.0), np.where(driven, 0.0, needed)
+        return Counterbalance(tau, left, beyond(model, left, needed, f, numbers, tolerance))
 
 
 def _at_rest(

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import several, text
+from ..arguments import one_number, several, text
 from ..closed import Closed
 from ..state import at_state
+from .cholesky import cholesky
 from .direct_calls import cached
 
 TWIST = ("rx", "ry", "rz", "x", "y", "z")
@@ -21,6 +22,20 @@ SHARED = 2.0**-8
 
 LARGEST_ROW = 1e100
 """Largest row of directions, and one over the smallest: squares are in Λ⁻¹, and leave the range of numbers from 1e154 on."""
+
+
+ON_SINGULAR = ("raise", "nan", "damped")
+"""What becomes of states at which not all directions can move independently."""
+
+
+def damping_of(on_singular: Any, damping: Any) -> float | None:
+    """The least singular value that counts, where it is damped. EvaluationError for what is not there."""
+    if text(on_singular, "on_singular") not in ON_SINGULAR:
+        raise _core.EvaluationError(f"on_singular={on_singular!r} of a task space: there are {', '.join(map(repr, ON_SINGULAR))}")
+    number = one_number(damping, "damping")
+    if not 0 < number < 1:
+        raise _core.EvaluationError(f"damping={number}: the least singular value of the directions in their units, between 0 and 1")
+    return number if on_singular == "damped" else None
 
 
 class TaskSpace(Closed):
@@ -40,6 +55,11 @@ class TaskSpace(Closed):
     so that near singular poses half as many digits are lost as by inverting Λ⁻¹; that costs O(nv³). Everything has a leading axis for a
     batch.
 
+    At a state where not all directions can move independently Λ does not exist. on_singular="raise" refuses it, and of a batch tells which
+    state; "nan" puts NaN there (`singular` tells where), and other states have what they have alone, to rounding; "damped" has at every
+    state singular values of W/d, d what each direction has alone, of `damping` at least: Λ = d⁻¹U σ₊⁻² U*d⁻¹, σ₊ = max(σ, damping), and
+    J̄ = YΛ, τ = J*Λ(...) by that, finite everywhere and unchanged where σ > damping. A direction that moves nothing at all takes no force.
+
     Attributes
     ----------
     names : of the directions, "hand.x"
@@ -47,8 +67,12 @@ class TaskSpace(Closed):
     velocity : (k,), J v
     """
 
-    def __init__(self, model: Any, q: Any, v: Any, directions: Mapping[str, tuple[np.ndarray, list[str]]]):
+    def __init__(
+        self, model: Any, q: Any, v: Any, directions: Mapping[str, tuple[np.ndarray, list[str]]], on_singular: str = "raise",
+        damping: float = 0.02,
+    ):  # fmt: skip
         self._model, self._directions = model, {frame: rows for frame, (rows, _) in directions.items()}
+        self._damping, self._masked = damping_of(on_singular, damping), on_singular == "nan"
         self._names = tuple(name for _, called in directions.values() for name in called)
         whole = [model.jacobian(frame, q) for frame in self._directions]
         rates = [rows @ model.jacobian_dot(frame, q, v) for frame, rows in self._directions.items()]
@@ -98,7 +122,7 @@ class TaskSpace(Closed):
     @cached_property
     def _factor(self) -> np.ndarray | None:
         """R (..., k, k), Λ = R*R; None where the decomposition is asked, of all states of a batch."""
-        compliance = self._by_recursion
+        compliance = None if self._damping else self._by_recursion
         if compliance is None or not self._moving.all():
             return None
         units = np.sqrt(np.diagonal(compliance, axis1=-2, axis2=-1))[..., None]
@@ -128,14 +152,10 @@ class TaskSpace(Closed):
     @cached_property
     def _parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """L⁻* (..., nv, nv), units d (..., k), and U, σ, V* of W/d."""
-        mass = self._model.mass_matrix(self._q)
-        try:
-            lower = np.linalg.cholesky(mass)
-        except np.linalg.LinAlgError:
-            raise _core.SingularOperatorError(
-                f"the mass matrix of {self._model.name!r} is not positive definite to rounding: no task space by its Cholesky factor"
-            ) from None
-        back = np.swapaxes(np.linalg.solve(lower, np.broadcast_to(np.eye(mass.shape[-1]), mass.shape)), -1, -2)
+        lower = cholesky(
+            self._model.mass_matrix(self._q), f"the mass matrix of {self._model.name!r}", "no task space by its Cholesky factor"
+        )
+        back = np.swapaxes(np.linalg.solve(lower, np.broadcast_to(np.eye(lower.shape[-1]), lower.shape)), -1, -2)
         W = self._jacobian @ back
         units = np.linalg.norm(W, axis=-1)
         size = np.abs(self._jacobian).max(axis=-1, initial=0.0) * np.abs(back).max(axis=(-1, -2), initial=0.0)[..., None]
@@ -180,11 +200,40 @@ class TaskSpace(Closed):
             found.append({self._names[moving[i]]: float(shares[i]) for i in np.argsort(-np.abs(shares)) if abs(shares[i]) >= 0.05})
         return found
 
+    @property
+    def singular(self) -> Any:
+        """Whether some directions cannot move independently, to rounding: a bool, of a batch (B,)."""
+        return self.rank < len(self._names)
+
     def _pseudo_inverse(self) -> np.ndarray:
-        """W⁺ (..., nv, k)."""
+        """W⁺ (..., nv, k); damped, V σ/σ₊² U*/d."""
         _, units, U, sigma, Vt = self._parts
-        inverse = np.where(self._kept, 1 / np.where(self._kept, sigma, 1.0), 0.0)
-        return np.swapaxes(Vt, -1, -2) * inverse[..., None, :] @ np.swapaxes(U, -1, -2) / units[..., None, :]
+        if self._damping:
+            inverse = sigma / np.maximum(sigma, self._damping) ** 2
+        else:
+            inverse = np.where(self._kept, 1 / np.where(self._kept, sigma, 1.0), 0.0)
+        return self._shown(np.swapaxes(Vt, -1, -2) * inverse[..., None, :] @ np.swapaxes(U, -1, -2) / units[..., None, :], 2)
+
+    def _shown(self, of: np.ndarray, axes: int) -> np.ndarray:
+        """NaN at singular states where that is asked."""
+        if not self._masked or self._factor is not None:
+            return of
+        return np.where(np.reshape(self.singular, (*self._batch, *[1] * axes)), np.nan, of)
+
+    def _inertia(self) -> np.ndarray:
+        """Λ (..., k, k) as far as it goes: by the factor, damped, or of what moves."""
+        if (inverse := self._factor) is not None:
+            return np.swapaxes(inverse, -1, -2) @ inverse
+        if self._damping:
+            _, units, U, sigma, _ = self._parts
+            turned = U / (units[..., :, None] * np.maximum(sigma, self._damping)[..., None, :])
+            inertia = turned @ np.swapaxes(turned, -1, -2)
+            if U.shape[-1] < U.shape[-2]:  # more directions than coordinates: no motion is along what is left of them
+                rest = (np.eye(U.shape[-2]) - U @ np.swapaxes(U, -1, -2)) / self._damping**2
+                inertia = inertia + rest / (units[..., :, None] * units[..., None, :])
+            return inertia
+        inverse = self._pseudo_inverse()
+        return np.swapaxes(inverse, -1, -2) @ inverse
 
     # ------------------------------------------------------------------ what follows
     @property
@@ -197,18 +246,22 @@ class TaskSpace(Closed):
 
     @property
     def inertia(self) -> np.ndarray:
-        """Λ (k, k). SingularOperatorError where not all directions can move independently, with those that cannot."""
-        if (inverse := self._factor) is None:
+        """Λ (k, k). SingularOperatorError where not all directions can move independently, with those that cannot, by "raise"."""
+        if self._factor is None:
             self._require_full("Λ")
-            inverse = self._pseudo_inverse()
-        return np.swapaxes(inverse, -1, -2) @ inverse
+        return self._inertia()
 
     def _require_full(self, what: str) -> None:
+        if self._masked or self._damping:
+            return
         short = np.atleast_1d(self.rank) < len(self._names)
         if short.any():
             b = int(short.argmax())
             lost, at = (self.lost, "this state") if not self._batch else (self.lost[b], f"state {b} of a batch of {len(short)}")
-            raise _core.SingularOperatorError(f"{what} does not exist at {at}: of {', '.join(self._names)} no motion along {told(lost)}")
+            more = "; on_singular='nan' or 'damped' goes on with the others" if self._batch else ""
+            raise _core.SingularOperatorError(
+                f"{what} does not exist at {at}: of {', '.join(self._names)} no motion along {told(lost)}{more}"
+            )
 
     # ------------------------------------------------------------------ derivatives
     @property
@@ -237,7 +290,9 @@ class TaskSpace(Closed):
 
     @property
     def inertia_derivative(self) -> np.ndarray:
-        """∂Λ = -Λ ∂(Λ⁻¹) Λ (k, k, nv), the last axis the coordinate. SingularOperatorError as `inertia`."""
+        """∂Λ = -Λ ∂(Λ⁻¹) Λ (k, k, nv), the last axis the coordinate. SingularOperatorError as `inertia`; damped it is refused."""
+        if self._damping:
+            raise _core.EvaluationError("a damped Λ has no derivative where singular values cross the damping; take on_singular='nan'")
         inertia = self.inertia
         return -np.einsum("...ij,...jkl,...km->...iml", inertia, self.compliance_derivative, inertia)
 
@@ -273,10 +328,9 @@ class TaskSpace(Closed):
         """
         wanted = self._vector(acceleration, "acceleration")
         short = wanted - self.bias(tau)
-        inverse = self._pseudo_inverse() if self._factor is None else self._factor
-        force = np.einsum("...ji,...j->...i", inverse, np.einsum("...ij,...j->...i", inverse, short))
+        force = np.einsum("...ij,...j->...i", self._inertia(), short)
         left = short - np.einsum("...ij,...j->...i", self.compliance, force)
-        if np.any(np.abs(left) > 1e-8 * np.maximum(1.0, np.abs(wanted).max(initial=0.0))):
+        if not self._masked and np.any(np.abs(left) > 1e-8 * np.maximum(1.0, np.abs(wanted).max(initial=0.0))):
             self._require_full("an acceleration with parts along what cannot move")
         given = np.zeros(self._model.nv) if tau is None else np.asarray(tau, float)
         return given + np.einsum("...ji,...j->...i", self._jacobian, force)
@@ -309,7 +363,7 @@ def told(lost: Iterable[Mapping[str, float]]) -> str:
 class TaskSpaceCalls:
     """The task space of nodes."""
 
-    def task_space(self, frames: Any, q=None, v=None) -> TaskSpace:
+    def task_space(self, frames: Any, q=None, v=None, *, on_singular: str = "raise", damping: float = 0.02) -> TaskSpace:
         """The motion of bodies and nodes along directions: inertia, inverse, null space, forward and inverse dynamics.
 
         Parameters
@@ -317,6 +371,10 @@ class TaskSpaceCalls:
         frames : a name, a list of names, or a dictionary from names to directions
             Directions are names among "rx", "ry", "rz", "x", "y", "z", or rows (k, 6) of their own, in the frame's axes, angular first.
         q, v : (nq,), (nv,), each with an optional leading batch axis
+        on_singular : {"raise", "nan", "damped"}
+            What becomes of states at which not all directions can move independently: an error with the state's number, NaN there, or
+            singular values of `damping` at least (A. Maciejewski, C. Klein, J. Robotic Systems 5, 1988: numerical filtering).
+        damping : the least singular value of W/d that counts, of 1 for directions that do not share their motion
 
         Returns
         -------
@@ -342,7 +400,7 @@ class TaskSpaceCalls:
         """
         model: Any = self
         q, v = at_state(model, q, v)
-        return TaskSpace(model, q, v, {frame: _rows(frame, directions) for frame, directions in _listed(frames)})
+        return TaskSpace(model, q, v, {frame: _rows(frame, directions) for frame, directions in _listed(frames)}, on_singular, damping)
 
 
 def _listed(frames: Any) -> list[tuple[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..scenes.progress_bar import ProgressBar
+from ..progress_bar import ProgressBar
 
 
 class SweepProgress(ProgressBar):

@@ -11,6 +11,7 @@ import numpy as np
 from .. import _core
 from ..arguments import whole
 from ..operators.operator_set import OperatorSet
+from ..progress_bar import StepProgress
 from .block_check import check_by_block
 from .block_reading import says_by_block
 from .dialects import in_dialect
@@ -22,7 +23,7 @@ from .statement_text import statement_text, telling_of
 from .vocabulary import is_operator
 
 
-def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = None) -> Report:
+def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = True) -> Report:
     """Check every theorem on the model of `operators`, at the present state and at `states` random ones.
 
     A theorem holds if its residual falls with epsilon and is below a derived bound that decides (see `judge`): in a scalar wider than
@@ -33,7 +34,8 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
     ----------
     states : random states, drawn from `seed`
     precision : the first scalar beside double, "extended", "quad", 50 or 100 digits
-    progress : called with each theorem's name, if given
+    progress : True: a bar in a terminal or notebook if it takes more than a second; False: none; a function: called with each theorem's
+        name
     """
     check_wider(precision)
     _check_seed(seed)
@@ -48,10 +50,11 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
         BoundState(operators, s)
         for s in ([None] if model is None else [_present(model), *(operators.random_state(rng) for _ in range(states))])
     ]
-    for theorem in operators.theorems():
-        if progress is not None:
-            progress(theorem.name)
-        report.findings.append(check_theorem(theorem, theorem.unmet(source), drawn, rng, precision))
+    theorems = operators.theorems()
+    with StepProgress(len(theorems), "theorems", progress) as bar:
+        for theorem in theorems:
+            bar(theorem.name)
+            report.findings.append(check_theorem(theorem, theorem.unmet(source), drawn, rng, precision))
     report.seconds = time.perf_counter() - begin
     return report
 

@@ -18,6 +18,10 @@ from .terminal_report import precision_text
 from .verdict_html import verdict_html
 
 _CARD = '<div style="font:13px/1.5 system-ui,sans-serif;color:inherit">{}</div>'
+_WORDS = "text-align:left;vertical-align:top;white-space:normal"
+"""Of a cell, whose style a notebook's own style sheet would set otherwise."""
+_KEPT = "text-align:left;vertical-align:top;white-space:nowrap;width:1%"
+_NUMBER = "text-align:right;vertical-align:top;white-space:nowrap;width:1%"
 _SMALL = '<div style="font-size:85%;opacity:.8">{}</div>'
 
 
@@ -58,15 +62,17 @@ def report_html(report: Any) -> str:
             groups.setdefault(found.group, []).append(found)
     rows = []
     for group, findings in groups.items():
-        rows += [f'<tr class="group"><th colspan="4">{escape(group)}</th></tr>'] if findings else []
+        rows += [f'<tr class="group"><th colspan="4" style="{_WORDS}">{escape(group)}</th></tr>'] if findings else []
         rows += map(_row, findings)
-    head = '<tr><th>verdict</th><th>theorem</th><th class="number">residual</th><th class="number">bound</th></tr>'
+    titles = (("", _KEPT, "verdict"), ("", _WORDS, "theorem"), ("number", _NUMBER, "residual"), ("number", _NUMBER, "bound"))
+    head = f"<tr>{''.join(f'<th class={kind!r} style={style!r}>{title}</th>' for kind, style, title in titles)}</tr>"
     summary = escape(report.summary()).replace("\n", "<br>")
     return (
         f'<div class="pycraft-report"><style>{_text("css")}</style><p><b>{summary}</b></p>'
         f'<div class="controls" hidden>{buttons}<input type="search" placeholder="words or letters" aria-label="words or letters">'
         f'<span class="count" role="status"></span></div>'
-        f'<div class="rows"><table>{head}{"".join(rows)}</table></div><script>{_text("js")}</script></div>'
+        f'<div class="rows"><table style="table-layout:auto;width:100%">{head}{"".join(rows)}</table></div>'
+        f"<script>{_text('js')}</script></div>"
     )
 
 
@@ -88,10 +94,11 @@ def _row(found: Any) -> str:
     numbers = [f"{found.wide_residual:.1e}", f"{found.wide_bound:.0e}"] if found.states else ["", ""]
     told = f"{found.name}; in {precision_text(found.wide_precision)}" if found.states else found.name
     told += f"; in double {found.in_double}" if found.states and found.in_double else ""
-    cells = "".join(f'<td class="number">{number}</td>' for number in numbers)
+    cells = "".join(f'<td class="number" style="{_NUMBER}">{number}</td>' for number in numbers)
     return (
-        f'<tr data-verdict="{escape(found.verdict)}" data-words="{words}" title="{escape(told)}"><td>{verdict_html(found.verdict)}</td>'
-        f"<td>{formula_html(found.statement)}{_SMALL.format(escape(notes)) if notes else ''}</td>{cells}</tr>"
+        f'<tr data-verdict="{escape(found.verdict)}" data-words="{words}" title="{escape(told)}">'
+        f'<td style="{_KEPT}">{verdict_html(found.verdict)}</td>'
+        f"<td style='{_WORDS}'>{formula_html(found.statement)}{_SMALL.format(escape(notes)) if notes else ''}</td>{cells}</tr>"
     )
 
 

@@ -7,9 +7,12 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from .. import _core
+from ..file_targets import writable_target
+from ..progress_bar import StepProgress
 from .budget import Budget
 from .dialects import in_dialect
 from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
@@ -17,9 +20,10 @@ from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements, as_text
 from .search import Counterexample, judged, smallest, understood
 from .terminal_report import STYLES, monospace, read_as, text_of, wrapped
-from .truth_picture import truth_html, truth_plot
+from .truth_picture import truth_html, truth_page, truth_plot, truth_size
 
 TRUE, FALSE, UNREAD = "true", "FALSE", "not said"
+PICTURES = (".png", ".svg", ".pdf")
 _WORDS = {HOLDS: TRUE, FAILS: FALSE, UNDECIDED: UNDECIDED}
 
 
@@ -128,6 +132,21 @@ class TruthMap:
         """The map as a picture: true and false tiles, in the false ones the smallest cases drawn as trees; returns the axes."""
         return truth_plot(self, ax)
 
+    def save(self, path: Any) -> Path:
+        """Write the map: as a page (".html") or as the picture of `plot` (".png", ".svg", ".pdf").
+
+        EvaluationError for another ending, OSError where it cannot be written.
+        """
+        target = writable_target(path, (".html", *PICTURES), "a truth map")
+        if target.suffix == ".html":
+            target.write_text(truth_page(self), encoding="utf-8")
+            return target
+        from matplotlib.figure import Figure
+
+        axes = self.plot(Figure(figsize=truth_size(self), layout="constrained").subplots())
+        axes.figure.savefig(target, dpi=150)
+        return target
+
 
 def implied(chosen: frozenset[str]) -> frozenset[str]:
     """The hypotheses with those that they imply: hinges of one coordinate have a constant H."""
@@ -156,6 +175,7 @@ def truth(
     budget: float = 5.0,
     vectors: Mapping[str, str] | None = None,
     dialect: str | None = None,
+    progress: bool = True,
 ) -> TruthMap:
     """The truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
 
@@ -167,11 +187,13 @@ def truth(
     budget : CPU seconds for the smallest cases, of all cells together
     vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
     dialect : the school in whose letters it is written, see `check`
+    progress : whether a bar is shown in a terminal or notebook if it takes more than a second
 
     Returns
     -------
     TruthMap
-        It prints as a table, shows as one in a notebook, `.plot()` draws it; `.where` are the fewest hypotheses under which it is true.
+        It prints as a table, shows as one in a notebook, `.plot()` draws it, `.save(path)` writes it; `.where` are the fewest
+        hypotheses under which it is true.
 
     Raises
     ------
@@ -186,14 +208,16 @@ def truth(
     """
     begin = time.perf_counter()
     statement = in_dialect(as_text(statement), dialect)
-    made = truth_within(statement, Budget(math.inf), precision, vectors)
+    made = truth_within(statement, Budget(math.inf), precision, vectors, progress)
     assert made is not None
     false = [c for c in made.cells if c.example is not None]
     whole = Budget(budget)
-    for i, found in enumerate(false if smallest_case else []):
-        left = whole.left / (len(false) - i)
-        only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
-        found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
+    with StepProgress(len(false), "smallest cases", progress) as bar:
+        for i, found in enumerate(false if smallest_case else []):
+            bar(", ".join((found.cell.shape, found.cell.J, found.cell.hinges, found.cell.base)))
+            left = whole.left / (len(false) - i)
+            only: dict[str, Any] = dict(meets=found.cell.least, allowed=found.cell.holds, vectors=vectors)
+            found.example = smallest(statement, precision=precision, budget=left, found=found.example, **only)
     made.seconds = time.perf_counter() - begin
     return made
 
@@ -226,16 +250,22 @@ def _refusal(statement: str, model: Any) -> Exception | None:
 
 
 def truth_within(
-    statement: str, budget: Budget, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
+    statement: str,
+    budget: Budget,
+    precision: str | int = "extended",
+    vectors: Mapping[str, str] | None = None,
+    progress: bool = True,
 ) -> TruthMap | None:
     """The truth map without smallest cases; None where the budget ends first."""
     begin = time.perf_counter()
     depth, cells = depth_for(statement, vectors), []
-    for cell in CELLS:
-        found = _cell_truth(statement, cell, depth, precision, vectors, budget)
-        if found is None:
-            return None
-        cells.append(found)
+    with StepProgress(len(CELLS), "cells of the truth map", progress) as bar:
+        for cell in CELLS:
+            bar(", ".join((cell.shape, cell.J, cell.hinges, cell.base)))
+            found = _cell_truth(statement, cell, depth, precision, vectors, budget)
+            if found is None:
+                return None
+            cells.append(found)
     return TruthMap(statement, cells, time.perf_counter() - begin, understood(statement))
 
 

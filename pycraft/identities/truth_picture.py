@@ -29,9 +29,22 @@ def truth_html(found: Any) -> str:
     return (
         f'<div style="font:13px/1.4 system-ui,sans-serif;color:inherit"><p>{formula_html(found.statement)}<br>'
         f'<b>{escape(found.verdict)}</b></p><div style="overflow-x:auto">'
-        f'<table style="border-collapse:collapse;color:inherit;font-size:12px"><tr>{head}</tr>{"".join(lines)}</table></div>'
+        f'<table style="table-layout:auto;border-collapse:collapse;color:inherit;font-size:12px"><tr>{head}</tr>'
+        f"{''.join(lines)}</table></div>"
         f'<div style="font-size:80%">{legend}</div></div>'
     )
+
+
+def truth_page(found: Any) -> str:
+    """A truth map as a page of its own."""
+    head = "<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><meta name='color-scheme' content='light dark'>"
+    return f"{head}<title>{escape(found.statement)}</title><body style='margin:16px'>{truth_html(found)}</body></html>\n"
+
+
+def truth_size(found: Any) -> tuple[float, float]:
+    """Inches of the picture by `truth_plot`."""
+    rows, columns, _ = _grid(found)
+    return 2.9 * len(columns) + 1.5, 0.72 * len(rows) + 1
 
 
 def truth_plot(found: Any, ax: Any = None) -> Any:
@@ -40,7 +53,7 @@ def truth_plot(found: Any, ax: Any = None) -> Any:
 
     rows, columns, cells = _grid(found)
     if ax is None:
-        _, ax = plt.subplots(figsize=(2.9 * len(columns) + 1.5, 0.72 * len(rows) + 1), layout="constrained")
+        _, ax = plt.subplots(figsize=truth_size(found), layout="constrained")
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
             cell = cells[row, column]

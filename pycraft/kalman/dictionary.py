@@ -67,10 +67,11 @@ class Dictionary:
         cells = "".join(
             f"<tr><td style='text-align:left'>\\({escape(latex)}\\)</td><td style='text-align:left'><code>{escape(name)}</code></td>"
             f"<td style='text-align:left'>{re.sub(r'[$]([^$]*)[$]', lambda m: chr(92) + '(' + m[1] + chr(92) + ')', escape(meaning))}</td>"
-            f"<td>{escape(shape)}</td></tr>"
+            f"<td style='text-align:left;white-space:nowrap'>{escape(shape)}</td></tr>"
             for latex, name, meaning, shape in _DICTIONARY
         )
-        return f"<table><tr><th>letter</th><th>in Python</th><th>in the filter</th><th>one block</th></tr>{cells}</table>"
+        titles = "".join(f"<th style='text-align:left'>{title}</th>" for title in ("letter", "in Python", "in the filter", "one block"))
+        return f"<table style='table-layout:auto'><tr>{titles}</tr>{cells}</table>"
 
     def latex(self) -> str:
         """The table as a LaTeX tabular."""

@@ -69,10 +69,10 @@ def _naming_the_step(call: Callable[..., _Answer]) -> Callable[..., _Answer]:
 
 def kalman(
     A: Any,
-    B: Any,
-    C: Any,
-    Q: Any,
-    R: Any,
+    B: Any = None,
+    C: Any = None,
+    Q: Any = None,
+    R: Any = None,
     x0: Any = None,
     P0: Any = None,
     measurements: Any = None,
@@ -84,8 +84,9 @@ def kalman(
     Parameters
     ----------
     A, B, C, Q, R : (n, n), (n, p), (m, n), (p, p), (m, m), or with a leading axis over time
-        A_t, B_t, Q_t lead from step t to t + 1: N - 1 of them, one more is not used. C_t, R_t: N. B=None is the identity. Numbers
-        stand for 1 x 1 matrices. Q and R are symmetric positive semidefinite; R may be zero where C P C* is not.
+        A_t, B_t, Q_t lead from step t to t + 1: N - 1 of them, one more is not used. C_t, R_t: N. B=None and C=None are identities: noise
+        enters every state, every state is measured. Q and R are always given, symmetric positive semidefinite; R may be zero where C P C*
+        is not. Numbers stand for 1 x 1 matrices.
     x0, P0 : (n,), (n, n)
         Mean and covariance of the first state, before its measurement: zero, and the stationary covariance of a model that does not
         change with time and is stable.
@@ -102,7 +103,8 @@ def kalman(
     Raises
     ------
     ModelError
-        Shapes that do not fit, a covariance that is not symmetric positive semidefinite, a P0 that is needed, numbers that are not finite.
+        A model of a mechanism in place of A, a Q or R that is left out, shapes that do not fit, a covariance that is not symmetric positive
+        semidefinite, a P0 that is needed, numbers that are not finite.
 
     Examples
     --------
@@ -120,6 +122,23 @@ def kalman(
     return StateSpace(A, B, C, Q, R, x0, P0, measurements, steps)
 
 
+_EXAMPLE = "pc.kalman(A=[[1, 0.1], [0, 1]], C=[[1, 0]], Q=0.5 * np.eye(2), R=0.2, P0=np.eye(2), steps=8)"
+
+
+def _require_matrices(A: Any, Q: Any, R: Any) -> None:
+    """ModelError, with what to write, where a mechanism is given for a state-space model, or the covariances of the noises are not."""
+    if isinstance(A, (_core.Multibody, OperatorSet)):
+        raise _core.ModelError(
+            f"kalman takes the matrices of a linear state-space model, such as {_EXAMPLE}; a mechanism runs beside the filter in "
+            ".play(y, model=arm), where arm is a serial chain with one body for each time step"
+        )
+    missing = [
+        f"{name}, the covariance of the {noise} noise" for name, x, noise in (("Q", Q, "process"), ("R", R, "measurement")) if x is None
+    ]
+    if missing:
+        raise _core.ModelError(f"kalman: give {' and '.join(missing)}, such as {_EXAMPLE}")
+
+
 class StateSpace:
     """A linear state-space model as an SKO tree, see `kalman`.
 
@@ -133,7 +152,10 @@ class StateSpace:
     """
 
     def __init__(self, A: Any, B: Any, C: Any, Q: Any, R: Any, x0: Any, P0: Any, measurements: Any, steps: int | None):
-        A, C, Q, R = (matrices(x, name) for x, name in ((A, "A"), (C, "C"), (Q, "Q"), (R, "R")))
+        _require_matrices(A, Q, R)
+        A = matrices(A, "A")
+        C = np.eye(A.shape[-1]) if C is None else matrices(C, "C")
+        Q, R = matrices(Q, "Q"), matrices(R, "R")
         self.n, self.m = A.shape[-1], C.shape[-2]
         B = np.eye(self.n) if B is None else matrices(B, "B", rows=self.n)
         y = None if measurements is None else self._series(measurements)
@@ -305,7 +327,7 @@ class StateSpace:
         Parameters
         ----------
         y : (N, m) measurements, those given to `kalman` where left out; NaN where one is missing
-        model : Multibody, a serial chain of N bodies; one on pins with rotors where left out
+        model : Multibody, a serial chain of N bodies; equal rods in a plane, on pins with rotors, where left out
         tau : (nv,) of its hinges, N m and N; ones where left out
 
         Returns
@@ -327,7 +349,7 @@ class StateSpace:
         --------
         >>> from pycraft.kalman import kalman
         >>> kalman(1.0, 1.0, 1.0, 1.0, 1.0, x0=0.0, P0=1.0, measurements=[1.0, 2.0]).play()
-        <filter beside 'tree of 2': 22 steps of 2 times and bodies>
+        <filter beside 'chain of 2 rods': 22 steps of 2 times and bodies>
         """
         return _core._face["play_smoother"](self, y, model, tau)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -270,6 +271,9 @@ class Frames(Closed, Mapping):
     def __init__(self, model: Any):
         self._model, self._core = model, _core.FrameTree(model)
         self._motions: dict[str, Motion] = {}
+
+    def __reduce__(self):
+        return attrgetter("frames"), (self._model,)  # a model brings its frames
 
     @property
     def t(self) -> float:

@@ -272,7 +272,8 @@ def _renamed(loop: dict[str, Any], called: Callable[[str], str]) -> dict[str, An
         where: dict[str, Any] = {"terms": [(on(hinge), *rest) for hinge, *rest in loop["terms"]]}
     else:
         where = {"a": on(loop["a"]), "b": on(loop["b"])}
-    return loop | where | {"name": _called(called, loop["name"])}
+    own = {key: part for key, part in loop.items() if key not in ("whole", "held")}  # what is locked there is a weld here
+    return own | where | {"name": _called(called, loop["name"])}
 
 
 def roots_of(model: Any) -> list[int]:

@@ -52,7 +52,8 @@ class Locking(Grafting):
     def lock(self, hinges: Any, *, impulsive: bool = False) -> Stop:
         """Lock hinges where they are: they become welds, with their names, and have no coordinates until they are unlocked.
 
-        Bodies, nodes and frames stay where they are, with their names; q and v of the other hinges are carried over. Operators and parts
+        Bodies, nodes and frames stay where they are, with their names; q and v of the other hinges are carried over. A coupling of
+        `loops` holds its other coordinates by the locked ones, until they are unlocked. Operators and parts
         made before are stale. A rotor on a locked hinge does not spin. Locked bodies still cost a step of each sweep; `coalesce` makes
         them one with what carries them.
 
@@ -72,8 +73,8 @@ class Locking(Grafting):
         Raises
         ------
         ModelError
-            A name that is not there, a hinge without coordinates, one whose coordinates a coupling of `loops` is of, a hinge that moves
-            where `impulsive` is False; a part, whose structure is the whole's. The model is as it was.
+            A name that is not there, a hinge without coordinates, a hinge that moves where `impulsive` is False, all hinges that a
+            coupling of `loops` is of; a part, whose structure is the whole's. The model is as it was.
         SingularHingeError
             Of impulsive locking: a coordinate that stays feels no inertia.
 
@@ -95,8 +96,7 @@ class Locking(Grafting):
         ['hinge2', 'hinge0']
         """
         chosen, impulsive = self._hinges_to_lock(hinges), switch(impulsive, "impulsive")
-        for name in chosen:
-            self._require_uncoupled(name)
+        held = self._held_couplings({name: self.q[self._slices(self._hinge_index(name))[0]] for name in chosen})
         numbers = sorted(self._hinge_index(name) for name in chosen)
         data = [self._body(k) for k in numbers]
         names = tuple(body["hinge"]["name"] for body in data)
@@ -112,6 +112,7 @@ class Locking(Grafting):
         after, impulses = (v, np.zeros(self.nv)) if moving is None else self._stop_at_once(numbers)
         stop = self._stopped(names, slices, v, after, impulses)
         self._locked_now(numbers, after)
+        self._hold(held)
         return stop
 
     def unlock(self, hinges: Any = None) -> list[str]:
@@ -145,7 +146,19 @@ class Locking(Grafting):
         for name in names:
             aside.put_back(self, name, self._hinges_before[name])
         self._hinges_before = {name: one for name, one in self._hinges_before.items() if name not in set(names)}
+        self._hold(self._held_couplings({}))
         return names
+
+    def _held_couplings(self, more: Mapping[str, np.ndarray]) -> dict[str, dict[str, Any]]:
+        """Couplings as they are to be declared where more hinges are locked, at these coordinates, beside those that are."""
+        if not self._kept_loops:
+            return {}
+        locked = {name: one["q"] for name, one in self._hinges_before.items()}
+        return self.loops._held(locked | {name: np.array(q) for name, q in more.items()})
+
+    def _hold(self, couplings: Mapping[str, Mapping[str, Any]]) -> None:
+        if couplings:
+            self.loops._declare_anew(couplings)
 
     @property
     def locked(self) -> list[str]:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from .. import _core
-from ..arguments import listed, name_of, one_number, pose_parts, text
+from ..arguments import listed, name_of, one_number, pose_parts, several, text
 from ..closed import Closed
+from ..dynamics.loop_tangents import RANK
 from ..state import at_state
 from .coordinates import coordinate_numbers
 from .curves import Curve, checked, curve_of, with_normals
 from .handles import Body, Node
+from .held_couplings import with_held
 from .hinge_axes import hinge_axes
 
 Relation = Callable[[np.ndarray], Any]
@@ -111,6 +114,9 @@ class Loops(Closed, Mapping):
         self._declared: dict[str, dict[str, Any]] = {}
         self._numbered: tuple[int, dict[str, int], list[int]] | None = None
 
+    def __reduce__(self):
+        return attrgetter("loops"), (self._model,)  # a model brings its loops
+
     # ------------------------------------------------------------------ rows
     @property
     def rows(self) -> list[str]:
@@ -184,6 +190,53 @@ class Loops(Closed, Mapping):
     def bias(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
         """Q̇θ̇ (rows,) or (B, rows): what is left of the rows' second derivatives at θ̈ = 0."""
         return self._core.bias(*at_state(self._model, q, v), precision)
+
+    def acceleration(self, q=None, v=None, vdot=None, *, fix: Any = ()) -> np.ndarray:
+        """v̇ (nv,) or (B, nv) that keeps the rows, Q v̇ + Q̇v = 0, the nearest to `vdot`: v̇ = vdot - Q⁺(Q vdot + Q̇v).
+
+        Parameters
+        ----------
+        q, v, vdot : a state on the loops, and accelerations to start from; zero where v and vdot are left out
+        fix : names of hinges or coordinates, or a list of them, whose accelerations stay as they are
+
+        EvaluationError where no accelerations of the others keep a row, by its name, as where v leaves the loops at a singular state or
+        too many are fixed. Cost: dense factors of Q.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> bars = pc.chain(3)
+        >>> closure = bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+        >>> bars.loops.acceleration([1, -1, 1 - np.pi], [0, 0, 0], [2.0, 0, 0], fix="hinge0").round(9).tolist()
+        [2.0, -2.0, 2.0]
+        """
+        fix, (q, v) = several(fix), at_state(self._model, q, v)
+        start = np.zeros(self._model.nv) if vdot is None else np.asarray(_core.real_array(vdot, "vdot"), float)
+        if start.ndim not in (1, 2) or start.shape[-1] != self._model.nv or not np.isfinite(start).all():
+            raise _core.ModelError(
+                f"vdot of {self._model.name!r} takes {self._model.nv} finite numbers, or (B, {self._model.nv}) of a batch"
+            )
+        Q, bias = self.jacobian(q), self.bias(q, v)
+        batch = np.broadcast_shapes(bias.shape[:-1], start.shape[:-1])
+        start = np.array(np.broadcast_to(start, (*batch, self._model.nv)))
+        moving = np.ones(self._model.nv, bool)
+        moving[coordinate_numbers(self._model, fix) or []] = False
+        if not len(self.rows):
+            return start
+        off = np.einsum("...ij,...j->...i", Q, start) + bias
+        start[..., moving] -= np.einsum("...ij,...j->...i", np.linalg.pinv(Q[..., moving], rcond=RANK), off)
+        left = np.abs(np.einsum("...ij,...j->...i", Q, start) + bias)
+        size = np.abs(bias) + self.sizes(q) * np.maximum(np.abs(start).max(axis=-1, initial=0.0), 1e-13)[..., None]
+        if not (left <= 1e-8 * size).all():
+            part = np.atleast_2d(left / size)
+            b, worst = (int(i) for i in np.unravel_index(np.argmax(part), part.shape))
+            which = f" (state {b} of a batch of {len(part)})" if len(part) > 1 else ""
+            held = f" with {', '.join(repr(getattr(one, 'name', one)) for one in fix)} as given" if fix else ""
+            raise _core.EvaluationError(
+                f"no accelerations of {self._model.name!r} keep row {self.rows[worst]!r}{held}{which}; fix fewer, or take a state that is "
+                "not singular (mobility(q))"
+            )
+        return start
 
     def coupled(self, name: str) -> list[int]:
         """The numbers of the coordinates that a coupling is of, in its order. KeyError where there is none of that name."""
@@ -332,7 +385,25 @@ class Loops(Closed, Mapping):
     def _stands_on(self, name: str) -> set[str]:
         """What a loop was declared on: bodies, nodes and hinges by name, "" for the base."""
         declared = self._declared[name]
+        declared = declared.get("whole", declared)
         return {hinge for hinge, _, _ in declared["terms"]} if "terms" in declared else {declared["a"], declared["b"]}
+
+    def _held(self, locked: Mapping[str, np.ndarray]) -> dict[str, dict[str, Any]]:
+        """Couplings that change where these hinges, and no others, are locked at these coordinates: as they are declared then."""
+        changed = {}
+        for name, declared in self._declared.items():
+            if "terms" in declared and ("whole" in declared or any(hinge in locked for hinge, *_ in declared["terms"])):
+                changed[name] = with_held(declared, locked)
+        return changed
+
+    def _declare_anew(self, changed: Mapping[str, Mapping[str, Any]]) -> None:
+        """These as they are given, all in the order in which they are."""
+        if changed:
+            before = self._description()
+            for loop in before:
+                self.remove(loop["name"])
+            for loop in before:
+                self._declare(changed.get(loop["name"], loop))
 
     def _turned(self, hinges: Mapping[str, int]) -> None:
         """Couplings follow the coordinates of hinges of so many that have them in the other order now; the loops' order stays."""

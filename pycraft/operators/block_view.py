@@ -142,7 +142,9 @@ class BlockView:
         )
         notes = [f"{LEGEND}; blank is an exact zero"] if max(self._shape) > ENTRIES else []
         caption = f"<div style='font-size:80%'>{escape('; '.join(notes))}</div>" if notes else ""
-        table = f"<table style='border-collapse:collapse;font-size:80%;color:inherit'><tr><th></th>{head}</tr>{body}</table>"
+        table = (
+            f"<table style='table-layout:auto;border-collapse:collapse;font-size:80%;color:inherit'><tr><th></th>{head}</tr>{body}</table>"
+        )
         return f"<p>{escape(self.title)}</p><div style='overflow-x:auto;max-width:100%'>{table}</div>{caption}"
 
 

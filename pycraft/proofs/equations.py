@@ -13,7 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from types import FunctionType
+from typing import Any
 
 from .words import ONE, SHARED, Alphabet, Number, Polynomial, Word, add_to, combine, framed, inverse_of, of_model, split
 
@@ -61,7 +63,7 @@ class Equation:
         if self._star is None:
             lhs, rhs = alphabet.star_of(self.lhs), alphabet.star_of(self.rhs)
             self._star = Equation("transpose", f"({self.text})*", lhs, rhs, source=self, uses=symmetries(alphabet, [*self.lhs, *self.rhs]))
-            self._star.check = lambda: lhs == alphabet.star_of(self.lhs) and rhs == alphabet.star_of(self.rhs)
+            self._star.check = partial(_transposes, lhs, rhs, self, alphabet)
         return self._star
 
     def copied(self, mark: str, base: str | None = None) -> Equation:
@@ -70,10 +72,9 @@ class Equation:
         if not mark and not base:
             return self
         if (mark, base) not in self._copies:
-            carried = lambda p: {marked(word, mark, base): c for word, c in p.items()}
-            lhs, rhs = carried(self.lhs), carried(self.rhs)
+            lhs, rhs = _carried(self.lhs, mark, base), _carried(self.rhs, mark, base)
             made = Equation("copy", self.text, lhs, rhs, hypothesis=self.hypothesis, source=self)
-            made.check = lambda: lhs == carried(self.lhs) and rhs == carried(self.rhs)
+            made.check = partial(_copies, lhs, rhs, self, mark, base)
             self._copies[mark, base] = made
         return self._copies[mark, base]
 
@@ -101,8 +102,27 @@ class Equation:
             return self.kind != "hypothesis" or self.hypothesis is not None
         return self.check is not None and self.check()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a structure is shown by are the rules that found it, of one process: what they say is pickled in their place."""
+        state = dict(vars(self))
+        if isinstance(self.check, FunctionType):
+            state["check"] = partial(bool, self.check())
+        return state
+
     def __repr__(self) -> str:
         return f"<{self.kind}: {self.text}>"
+
+
+def _carried(p: Polynomial, mark: str, base: str) -> Polynomial:
+    return {marked(word, mark, base): c for word, c in p.items()}
+
+
+def _copies(lhs: Polynomial, rhs: Polynomial, of: Equation, mark: str, base: str) -> bool:
+    return lhs == _carried(of.lhs, mark, base) and rhs == _carried(of.rhs, mark, base)
+
+
+def _transposes(lhs: Polynomial, rhs: Polynomial, of: Equation, alphabet: Alphabet) -> bool:
+    return lhs == alphabet.star_of(of.lhs) and rhs == alphabet.star_of(of.rhs)
 
 
 SYMMETRY: dict[str, Equation] = {}

@@ -85,6 +85,9 @@ class Algorithm:
         inside = [q for item in self._program.items if isinstance(item, Operator) for q in reads(item)]
         self._needed = needed.union(inside)
 
+    def __reduce__(self):
+        return Algorithm, (self._expression, self.language, self.request)  # a plan is of one process, and made anew
+
     def _sum(self) -> Program:
         """The scalar: numbers and parts added up."""
         program = Program(items=list(self._book.items))

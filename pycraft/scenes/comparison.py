@@ -39,7 +39,7 @@ class ComparisonTable(TidyTable):
     )  # fmt: skip
     shown = {
         "left out": "left out", "acceleration": "error of v̇", "trajectory": "error of q (rad, m)", "evaluation": "evaluation",
-        "saved": "saved", "run": "run", "saved of run": "saved", "refused": "",
+        "saved": "saved of it", "run": "run", "saved of run": "saved of run", "refused": "",
     }  # fmt: skip
     short: ClassVar[dict[str, str]] = {"acceleration": "of v̇", "trajectory": "of q"}
     legend: ClassVar[dict[str, str]] = {"*": "Pareto front"}
@@ -100,6 +100,8 @@ class ComparisonTable(TidyTable):
             return seconds_text(row[key])
         if key == "saved" and abs(row[key]) < self.noise:
             return "none" if row["left out"] else ""
+        if row["left out"] and row[key] < -1:  # a run that takes several times as long saves no percentage
+            return f"takes {1 - row[key]:.2g} ×"
         return share_text(row[key]) if row["left out"] else ""
 
     def marks(self, row: dict[str, Any]) -> str:

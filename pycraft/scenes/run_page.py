@@ -11,17 +11,21 @@ import numpy as np
 
 from .. import _core
 from ..file_targets import writable_target
+from ..models.limits import coordinate_limits
 from ..view.figure_data import figure_data, number_text, pose_rows
 from ..view.page import Page
 from ..view.skeleton import Skeleton
-from ..view.web_page import web_page
+from ..view.web_page import notes, web_page
+from .crossed_limits import SLACK, crossed_names
 from .run_animation import configurations, positive
-from .run_plots import chosen_panels
+from .run_plots import chosen_panels, event_marks
 
 LARGEST = 100.0
 """MB of poses in one page."""
 POINTS = 1000
 """Of a line of a plot: of more of the run's own times, so many are shown, evenly by their number."""
+FAR = 3.0
+"""A loose model whose way is this many times its size is followed by the camera at first."""
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
 
 
@@ -37,7 +41,7 @@ class RunPage(Page):
     def __init__(self, run: Any, fps: Any, speed: Any, trace: str | None, what: tuple[str, ...], coordinates: Any):
         rate, self.speed = positive(fps, "fps"), positive(speed, "speed")
         self._run = run
-        self.times = _times(run, rate / self.speed)
+        self.times = frame_times(run, rate / self.speed)
         self._q = configurations(run, self.times)
         self._skeleton = Skeleton(run._unedited_model())
         self._way = None if trace is None else run.model.pose(trace, self._q)[:, :3, 3]
@@ -53,19 +57,52 @@ class RunPage(Page):
              "lines": [number_text(values[shown]) for values in panel.lines.values()]}
             for panel in self._panels
         ]  # fmt: skip
+        marks, thinned = event_marks(run)
+        figure = figure_data(self._skeleton, self._q)
         data: dict[str, Any] = {
-            "figure": figure_data(self._skeleton, self._q), "times": number_text(self.times),
+            "figure": figure, "times": number_text(self.times),
             "poses": number_text(pose_rows(self._skeleton, self._q)), "panels": panels,
             "way": None if self._way is None else number_text(self._way),
-            "marks": [float(t) for event in run.events.values() for t in event.t],
+            "marks": marks, "beyond": self._beyond(), "follow": self._follow(figure),
         }  # fmt: skip
         speeds = "".join(
             f'<option value="{speed:g}"{" selected" if speed == self.speed else ""}>×{speed:g}</option>'
             for speed in sorted({*SPEEDS, self.speed})
         )
-        told = [f"{', '.join(run.effects) or 'no effects'}; {first:g} to {last:g} s", *data["figure"]["unshown"]]
-        said = escape("; ".join(told))
-        return web_page("film", run.model.name, data, {"said": said, "speeds": speeds})
+        crossed = self._crossed()
+        told = [f"{', '.join(run.effects) or 'no effects'}; {first:g} to {last:g} s", *([thinned] if thinned else [])]
+        texts = {"said": escape("; ".join(told)), "speeds": speeds, "notes": notes(data["figure"]["unshown"]), "crossed": crossed}
+        return web_page("film", run.model.name, data, texts)
+
+    def _follow(self, figure: dict[str, Any]) -> str:
+        """What the camera follows at first: a model that is loose and goes far beyond its own size; else nothing."""
+        loose = any(kind == "free" for kind in self._skeleton.kinds)
+        return "robot" if loose and max(figure["half"]) > FAR * max(figure["near"]) else ""
+
+    def _beyond(self) -> list[dict[str, Any]]:
+        """Of each coordinate beyond a limit that no effect holds: its body, and the first and last frame of each time that it is."""
+        model, found = self._run.model, []
+        owners = {j: k for k, hinge in enumerate(model.hinges.values()) for j in range(hinge.v_slice.start, hinge.v_slice.stop)}
+        q_index = coordinate_limits(model).q_index
+        for one in self._crossed_limits():
+            j = model.coordinate_names.index(one.coordinate)
+            value = self._q[:, q_index[j]]
+            slack = SLACK * max(1.0, abs(one.limit))
+            beyond = value > one.limit + slack if one.upper else value < one.limit - slack
+            edges = np.flatnonzero(np.diff(np.concatenate([[False], beyond, [False]]).astype(int))).reshape(-1, 2)
+            found.append({"body": owners[j], "spans": [[int(first), int(last) - 1] for first, last in edges]})
+        return found
+
+    def _crossed_limits(self) -> list[Any]:
+        return [] if self._run._edited else self._run.crossed_limits
+
+    def _crossed(self) -> str:
+        """The coordinates beyond their limits, for the heading; "" where there are none."""
+        crossed = self._crossed_limits()
+        if not crossed:
+            return ""
+        every = "; ".join(str(one) for one in crossed)
+        return f'<span class="crossed" title="{escape(every)}">beyond limits: {escape(crossed_names(crossed))}</span>'
 
     def save(self, path: str | Path) -> Path:
         """Write it to a path that ends in ".html". EvaluationError for another ending, OSError where it cannot be written."""
@@ -83,7 +120,7 @@ def checked_page(path: Any) -> Path:
     return writable_target(path, (".html",), "a page")
 
 
-def _times(run: Any, rate: float) -> np.ndarray:
+def frame_times(run: Any, rate: float) -> np.ndarray:
     """Times of frames, `rate` a second of the run: from its first to its last, which is one."""
     first, last = float(run.t[0]), float(run.t[-1])
     count = (last - first) * rate

@@ -13,6 +13,8 @@ from .effects.effect import names_of
 
 WHAT = ("q", "v", "vdot", "energy", "balance", "forces")
 COLOURS = ("#1f4e79", "#c55a11", "#4d7c2a", "#6b3fa0", "#8a8a8a", "#a8324a", "#2a9d8f", "#b8860b")
+MARKS = 60
+"""Vertical lines at events."""
 NAMED = 8
 """Lines of a panel that have names: of more, the first ones."""
 
@@ -98,7 +100,7 @@ def _figure(run: Any, panels: list[Panel]) -> Any:
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(len(panels), 1, sharex=True, squeeze=False, figsize=(8.5, 1.0 + 1.9 * len(panels)), layout="constrained")
-    marks = [float(t) for event in run.events.values() for t in event.t]
+    marks, thinned = event_marks(run)
     for panel, ax in zip(panels, axes[:, 0], strict=True):
         for i, (name, values) in enumerate(panel.lines.items()):
             style = ":" if "- work" in name else "-" if i < len(COLOURS) else "--"
@@ -113,5 +115,21 @@ def _figure(run: Any, panels: list[Panel]) -> Any:
         ax.spines[["top", "right"]].set_visible(False)
         ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7.5, frameon=False, borderaxespad=0)
     axes[-1, 0].set_xlabel("time, s")
-    figure.suptitle(f"{run.model.name}, {', '.join(run.effects) or 'no effects'}", fontsize=10, x=0.01, ha="left")
+    heading = "; ".join([f"{run.model.name}, {', '.join(run.effects) or 'no effects'}", *([thinned] if thinned else [])])
+    figure.suptitle(heading, fontsize=10, x=0.01, ha="left")
     return figure
+
+
+def event_marks(run: Any) -> tuple[list[float], str]:
+    """Times of the lines that mark events, s, and what to say where there are more events than lines.
+
+    More than MARKS lines would paint a plot black: then it is those MARKS events that lie nearest to times at even distances.
+    """
+    times = np.sort([float(t) for event in run.events.values() for t in event.t])
+    if len(times) <= MARKS:
+        return times.tolist(), ""
+    even = np.linspace(times[0], times[-1], MARKS)
+    after = np.clip(np.searchsorted(times, even), 1, len(times) - 1)
+    nearest = np.where(even - times[after - 1] <= times[after] - even, after - 1, after)
+    shown = times[np.unique(nearest)]
+    return shown.tolist(), f"vertical lines: {len(shown)} of {len(times):,} events"

@@ -10,10 +10,10 @@ import numpy as np
 from .. import _core
 from ..arguments import one_number
 from ..dynamics.integrator_names import IntegratorName, integrator_named
+from ..progress_bar import RunProgress
 from ..state import at_state
 from .checkpoint import Checkpoint, coordinates_of
 from .events import Event, events_for_core, listed_events
-from .progress_bar import RunProgress
 from .run import Run
 from .runs_on_disk import checked_output
 

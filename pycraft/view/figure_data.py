@@ -15,6 +15,8 @@ _FLAT_AXES = {1: (0, 2), 2: (0, 1), 0: (1, 2)}
 """To the right and upwards, of a plane by its normal."""
 _THIN = 0.18
 """Of the largest width: what the narrow ones of a box are at least."""
+_BELOW = 0.05
+"""Of a standing model's width: how far it may reach below its base."""
 
 
 def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
@@ -31,13 +33,14 @@ def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
     dict
         Plain data: names of bodies, the number of what carries each (-1 the base), their hinges; points and lines by what they are, with
         the numbers of bodies ("of") and places in their frames ("at", m); axes of hinges and half the length that they are drawn with,
-        m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m), the height of the floor; "ramp", the
-        colours of numbers; "solids", triangles of shapes by their bodies, and "unshown", why others are not there.
+        m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m; "near", half of the first state's),
+        the height of the floor (the base's, unless the model hangs below it at the first state); "ramp", the colours of numbers;
+        "solids", triangles of shapes by their bodies, and "unshown", why others are not there.
     """
     described = skeleton.model.description()["bodies"]
     hinge, owner, point, direction = skeleton.axes
     flat = skeleton.normals()
-    right, up = _FLAT_AXES[next(n for n in _FLAT_AXES if n in flat)] if flat else _upright(skeleton.model)
+    right, up = _FLAT_AXES[next(n for n in _FLAT_AXES if n in flat)] if flat else upright(skeleton.model)
     colours = [None if kind == "custom" else HINGES[kind][1] for kind in skeleton.kinds]
     shapes, missing = skeleton.solids
     data: dict[str, Any] = {
@@ -63,8 +66,8 @@ def number_text(x: Any) -> str:
     return base64.b64encode(np.ascontiguousarray(x, "<f4").tobytes()).decode("ascii")
 
 
-def _upright(model: Any) -> tuple[int, int]:
-    """The axis that gravity is nearest to is upright."""
+def upright(model: Any) -> tuple[int, int]:
+    """Return the axes (0, 1, 2 for x, y, z) to the right and upwards in a picture: upwards the one that gravity is nearest to, else z."""
     gravity = np.abs(model.gravity)
     up = int(np.argmax(gravity)) if gravity.any() else 2
     return (up + 1) % 3, up
@@ -83,17 +86,39 @@ def _corners(vertices: np.ndarray) -> np.ndarray:
 
 def _box(skeleton: Skeleton, q: np.ndarray, grounded: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> dict[str, Any]:
     poses = skeleton.poses(q)
-    kinds = [kind for kind in skeleton.lines if kind != "ground" or grounded]
-    shown = (*skeleton.points.values(), *(skeleton.lines[kind] for kind in kinds))
-    corners = [(np.full(8, of), _corners(vertices)) for of, vertices in solid]
-    everything = np.concatenate([*(placed(poses, *at).reshape(-1, 3) for at in (*shown, *corners)), np.zeros((int(grounded), 3))])
-    everything = everything[np.isfinite(everything).all(axis=1)]
-    low, high = (everything.min(axis=0), everything.max(axis=0)) if len(everything) else (np.zeros(3), np.zeros(3))
+    shown = _shown_points(skeleton, poses, grounded, solid)
+    first = shown if q.ndim == 1 else _shown_points(skeleton, poses.reshape(-1, *poses.shape[-3:])[0], grounded, solid)
+    low, high, half = _extent_of(shown)
     reach = float((high - low).max()) or 1.0
-    half = np.maximum((high - low) / 2, _THIN * reach) + 0.06 * reach
     bones = np.linalg.norm(np.diff(placed(poses, *skeleton.lines["bone"]), axis=-2), axis=-1)
     typical = float(np.median(bones[bones > 1e-9 * reach])) if np.any(bones > 1e-9 * reach) else reach
     return {
-        "centre": _rounded((low + high) / 2), "half": _rounded(half), "floor": float(f"{low[up]:.7g}"),
-        "tick": float(f"{min(0.045 * reach, 0.4 * typical):.7g}"),
+        "centre": _rounded((low + high) / 2), "half": _rounded(half), "near": _rounded(_extent_of(first)[2]),
+        "floor": float(f"{_floor(first, low, grounded, up, solid):.7g}"), "tick": float(f"{min(0.045 * reach, 0.4 * typical):.7g}"),
     }  # fmt: skip
+
+
+def _shown_points(skeleton: Skeleton, poses: np.ndarray, grounded: bool, solid: list[tuple[int, np.ndarray]]) -> np.ndarray:
+    """All that is drawn, (n, 3): points, ends of lines, corners of shapes, and the base's origin where that is shown."""
+    kinds = [kind for kind in skeleton.lines if kind != "ground" or grounded]
+    shown = (*skeleton.points.values(), *(skeleton.lines[kind] for kind in kinds))
+    corners = [(np.full(8, of), _corners(vertices)) for of, vertices in solid]
+    found = np.concatenate([*(placed(poses, *at).reshape(-1, 3) for at in (*shown, *corners)), np.zeros((int(grounded), 3))])
+    return np.asarray(found[np.isfinite(found).all(axis=1)])
+
+
+def _extent_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The ends of a box around points, and half of its edges with a margin, none of which is thin."""
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
+    reach = float((high - low).max()) or 1.0
+    return low, high, np.maximum((high - low) / 2, _THIN * reach) + 0.06 * reach
+
+
+def _floor(first: np.ndarray, low: np.ndarray, grounded: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> float:
+    """The height of the floor: under the base of what stands, under the first state of what is loose, else under all that is seen."""
+    lowest = float(first[:, up].min(initial=np.inf))
+    if not grounded:
+        return lowest if np.isfinite(lowest) else float(low[up])
+    base = min([0.0, *(float(vertices[:, up].min()) for of, vertices in solid if of < 0)])
+    reach = float(np.ptp(first, axis=0).max()) if len(first) else 0.0
+    return base if lowest >= base - _BELOW * reach else float(low[up])

@@ -18,6 +18,7 @@ from ..arguments import whole
 from ..identities.checker import check_model
 from ..identities.family import Spec
 from ..identities.report import Report
+from ..progress_bar import StepProgress
 from .figure_data import figure_data, number_text, pose_rows
 from .page import Page
 from .skeleton import Skeleton
@@ -47,7 +48,7 @@ class HypothesisPage(Page):
 
     HEIGHT = 620
 
-    def __init__(self, bodies: Any = 4, seed: Any = 0, progress: Callable[[str], None] | None = None):
+    def __init__(self, bodies: Any = 4, seed: Any = 0, progress: Callable[[str], None] | bool = True):
         count = whole(bodies, "bodies")
         if not _LEAST <= count <= _MOST:
             raise _core.EvaluationError(f"bodies={count}: from {_LEAST}, of which two are on a branch each, to {_MOST}")
@@ -68,15 +69,21 @@ class HypothesisPage(Page):
             known = "; ".join(f"{name}: {', '.join(map(repr, choices))}" for name, choices in SWITCHES.items())
             raise _core.EvaluationError(f"no positions {positions}: one of each of {known}, in this order")
         if positions not in self._reports:
-            if self._progress is not None:
+            if callable(self._progress):
                 self._progress(", ".join(positions))
-            self._reports[positions] = check_model(_in_motion(self.specs[positions], self._seed).soa, states=0, seed=self._seed)
+            self._reports[positions] = check_model(
+                _in_motion(self.specs[positions], self._seed).soa, states=0, seed=self._seed, progress=False
+            )
         return self._reports[positions]
 
     @cached_property
     def html(self) -> str:
         said: dict[str, Any] = {}  # some are said of some models alone
-        findings = [finding for positions in self.specs for finding in self.report(*positions).findings]
+        findings = []
+        with StepProgress(len(self.specs), "models", not callable(self._progress) and self._progress is not False) as bar:
+            for positions in self.specs:
+                bar(", ".join(positions))
+                findings += self.report(*positions).findings
         for finding in (finding for finding in findings if finding.verdict != "waiting"):
             said.setdefault(finding.name, {"name": finding.name, "group": finding.group, "text": finding.statement,
                                            "hypotheses": finding.hypotheses})  # fmt: skip
@@ -106,7 +113,7 @@ class HypothesisPage(Page):
         return f"<switches of hypotheses: {len(self.specs)} models of {bodies} bodies, {len(self._reports)} of them checked by now>"
 
 
-def hypothesis_switches(bodies: int = 4, seed: int = 0, *, progress: Callable[[str], None] | None = None) -> HypothesisPage:
+def hypothesis_switches(bodies: int = 4, seed: int = 0, *, progress: Callable[[str], None] | bool = True) -> HypothesisPage:
     """A page with switches for the hypotheses of theorems: J, chain or branch, the kind of hinges, fixed or free base.
 
     Flipping one shows which theorems of the catalogue break, and by how much. Every combination is a model, 24 of them, on which the
@@ -116,7 +123,8 @@ def hypothesis_switches(bodies: int = 4, seed: int = 0, *, progress: Callable[[s
     ----------
     bodies : of each model, 3 to 16
     seed : of their inertias, hinges and state
-    progress : called with the positions before each model, if given
+    progress : True: a bar in a terminal or notebook while the page is made; False: none; a function: called with the positions before each
+        model
 
     Returns
     -------

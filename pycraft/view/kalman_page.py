@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..models.generators import tree
+from ..models.generators import chain
 from ..recursions import Step, algorithm
 from .figure_data import figure_data, number_text, pose_rows
 from .page import Page
@@ -24,6 +24,10 @@ from .web_page import web_page
 
 MOST = 60
 """Time steps, and bodies: eleven equations each."""
+BENT = 2 * np.pi / 3
+"""rad: the angle between the first and the last rod of the chain beside the filter."""
+ROTOR = 0.2
+"""kg m², of each hinge of that chain: the measurement noise in the dictionary."""
 WORDS = {
     "P": ("covariance of the predicted state", "articulated-body inertia: k and all outboard of it, hinges free"),
     "D": ("covariance of the innovation", "inertia that the hinge feels"),
@@ -105,9 +109,11 @@ def _order(steps: list[Step]) -> list[tuple[int, int, str]]:
 
 
 def _chain(count: int) -> Any:
-    """Bodies on pins with rotors, at a random state."""
-    model = tree(range(-1, count - 1), ["pin"] * count, seed=1, rotor_inertia=True)
-    model.q = 0.4 * np.asarray(model.random_state(1).q)
+    """Equal rods in a plane, on pins with rotors, bent into an arc of a third of a circle: its tip is the first time step."""
+    model = chain(count)
+    for hinge in model.hinges.values():
+        hinge.rotor_inertia = ROTOR
+    model.q = np.full(count, BENT / count)
     return model
 
 

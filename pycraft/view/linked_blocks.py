@@ -18,6 +18,8 @@ from .sweep_picture import HEIGHT, RADIUS, WIDTH
 
 MOST = 60
 """Blocks a row or column: each is a square that can be pointed at."""
+NUMBERED = 38
+"""Pixels of a square that has room for its number."""
 _LETTERS, _FONT = 16, 11.0
 
 
@@ -76,15 +78,27 @@ class LinkedBlocks:
         return (
             f'<div class="pycraft-linked"><style>{code["css"]}</style><p>{escape(self._view.title)}</p>'
             f'<div class="both"><div class="blocks">{self._picture()}</div><div class="figure">{self._figure()}</div></div>'
-            f'<div class="told">blue positive, orange negative, deeper where larger; blank is an exact zero</div>'
+            f'<div class="told">{escape(self._caption())}</div>'
             f'<script type="application/json">{data}</script><script>{code["js"]}</script></div>'
         )
+
+    def _caption(self) -> str:
+        """What is seen, and what can be done: it stands below until something is pointed at."""
+        numbers = "the number is its largest entry; " if self._size() >= NUMBERED else ""
+        return (
+            f"Each square is a block: {numbers}blue positive, orange negative, deeper where larger, blank an exact zero. Point at a block "
+            "to see its numbers and the path between its two bodies, at a body to see its row and column; a click keeps them."
+        )
+
+    def _size(self) -> float:
+        """Of a square."""
+        return float(np.clip(480 / max(len(self._view.rows), len(self._view.columns), 1), 9, 52))
 
     # ------------------------------------------------------------------ pictures
     def _picture(self) -> str:
         """The blocks, each a square with the numbers of its two bodies."""
         numbers, rows, columns = self._view.largest(), self._view.rows, self._view.columns
-        size = float(np.clip(360 / max(len(rows), len(columns), 1), 9, 26))
+        size = self._size()
         left, top = (0.62 * _FONT * min(max(map(len, names), default=0), _LETTERS) + 8 for names in (rows, columns))
         scale = np.abs(numbers).max(initial=0.0)
         parts = []
@@ -96,6 +110,9 @@ class LinkedBlocks:
                 where = f"x='{left + size * j:.1f}' y='{top + size * i:.1f}' width='{size:.1f}' height='{size:.1f}'"
                 to = f"data-row='{self._rows[i]}' data-column='{self._columns[j]}'{' data-zero' if x == 0 else ''}"
                 parts.append(f"<rect class='block' {to} {where} {fill}><title>{escape(title)}</title></rect>")
+                if x and size >= NUMBERED:
+                    at = f"x='{left + size * (j + 0.5):.1f}' y='{top + size * (i + 0.5) + 4:.1f}'"
+                    parts.append(f"<text class='entry' {at} text-anchor='middle'>{x:.2g}</text>")
         every = max(1, int(np.ceil(_FONT / size)))
         for i, name in list(enumerate(rows))[::every]:
             parts.append(f"<text x='{left - 4:.1f}' y='{top + size * (i + 0.5) + 4:.1f}' text-anchor='end'>{escape(_short(name))}</text>")

@@ -30,7 +30,7 @@ def model_html(model: Any) -> str:
     facts += [f"gravity ({', '.join(f'{x:g}' for x in gravity)}) m/s²" if gravity.any() else "no gravity"]
     facts += [f"{count} loop{'s' * (count > 1)}"] if (count := len(model.loops)) else []
     small = (
-        "margin:0;overflow:auto;max-height:340px;background:transparent;color:inherit;"
+        "margin:0;overflow:auto;max-height:340px;white-space:pre;overflow-wrap:normal;word-break:normal;background:transparent;color:inherit;"
         "font:12px/1.35 'DejaVu Sans Mono',ui-monospace,monospace"
     )
     tree = f'<pre style="{small}">{escape(str(model.tree(LISTED)))}</pre>'

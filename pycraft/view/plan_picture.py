@@ -38,7 +38,7 @@ def plan_html(explanation: Any) -> str:
     titles = "".join(
         f'<th style="{_NUMBER if i in (0, 3, 4) else _CELL}">{t}</th>' for i, t in enumerate(("", "step", "tier", "cost", "memory"))
     )
-    table = f'<table style="border-collapse:collapse;color:inherit;font-size:12px"><tr>{titles}</tr>{rows}</table>'
+    table = f'<table style="table-layout:auto;border-collapse:collapse;color:inherit;font-size:12px"><tr>{titles}</tr>{rows}</table>'
     return (
         f'<div style="font:13px/1.4 system-ui,sans-serif;color:inherit"><div>{head}</div>{notes}<div style="overflow-x:auto">{table}</div>'
         f"{_sweeps(expression, request)}</div>"

@@ -130,7 +130,7 @@ class Skeleton:
         hinges = placed(poses, *self.lines["ground"])[:, 1]
         carried = np.concatenate([hinges, *(placed(poses, *self.points[kind]) for kind in ("joint", "mass"))])
         reach = np.ptp(carried, axis=0).max() if len(carried) else 0.0
-        return reach == 0 or not len(hinges) or bool(np.linalg.norm(hinges, axis=1).min() <= _FAR * reach)
+        return bool(reach == 0 or not len(hinges) or np.linalg.norm(hinges, axis=1).min() <= _FAR * reach)
 
     def normals(self) -> tuple[int, ...]:
         """Normals (0, 1, 2 for x, y, z) of the coordinate planes that the model can never leave; none for most models."""

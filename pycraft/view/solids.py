@@ -11,6 +11,7 @@ import numpy as np
 from .. import _core
 from ..models.loaders.urdf import resolve_package
 from ..models.shapes import Shape
+from ..progress_bar import StepProgress
 
 ROUND = 16
 """Sides of what is round."""
@@ -18,8 +19,10 @@ MOST = 6000
 """Triangles of a figure: a canvas without a graphics card draws and sorts so many some twenty times a second."""
 
 
-def solids(model: Any) -> tuple[list[dict[str, Any]], list[str]]:
+def solids(model: Any, most: int | None = MOST) -> tuple[list[dict[str, Any]], list[str]]:
     """Vertices (n, 3) and faces (m, 3) of the model's shapes in the frames of their bodies, and why others are not shown.
+
+    Together some `most` triangles, of None as many as their files have. Reading many meshes shows a bar in a terminal or notebook.
 
     Each is a dictionary: "of", the number of the body, -1 the base; "vertices", "faces", "colour". A shape on a body that was taken out
     is not shown; one on a body that is lumped with another is where its node is.
@@ -32,18 +35,20 @@ def solids(model: Any) -> tuple[list[dict[str, Any]], list[str]]:
     nodes = {node["name"]: node for node in described["nodes"]}
     made: list[dict[str, Any]] = []
     missing: dict[str, None] = {}
-    for shape in shapes:
-        placed = _placed(shape, numbers, nodes)
-        if placed is None:
-            continue
-        try:
-            vertices, faces = triangles(shape)
-        except _core.Error as error:
-            missing[str(error)] = None
-            continue
-        owner, X = placed
-        made.append({"of": owner, "vertices": vertices @ X[:3, :3].T + X[:3, 3], "faces": faces, "colour": shape.colour})
-    return _thinned(made), list(missing)
+    with StepProgress(len(shapes), "shapes") as bar:
+        for shape in shapes:
+            bar(Path(shape.file).name or shape.kind)
+            placed = _placed(shape, numbers, nodes)
+            if placed is None:
+                continue
+            try:
+                vertices, faces = triangles(shape)
+            except _core.Error as error:
+                missing[str(error)] = None
+                continue
+            owner, X = placed
+            made.append({"of": owner, "vertices": vertices @ X[:3, :3].T + X[:3, 3], "faces": faces, "colour": shape.colour})
+    return (made if most is None else _thinned(made, most)), list(missing)
 
 
 def triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
@@ -117,14 +122,14 @@ def _placed(shape: Shape, numbers: dict[str, int], nodes: dict[str, Any]) -> tup
     return node["body"], X @ shape.placement
 
 
-def _thinned(made: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Together some MOST triangles: meshes lose theirs, by their numbers, and primitives none."""
+def _thinned(made: list[dict[str, Any]], most: int) -> list[dict[str, Any]]:
+    """Together some `most` triangles: meshes lose theirs, by their numbers, and primitives none."""
     primitive = 16 * ROUND  # what one has at most
     total = sum(len(solid["faces"]) for solid in made)
-    if total <= MOST:
+    if total <= most:
         return made
     few = sum(len(solid["faces"]) for solid in made if len(solid["faces"]) <= primitive)
-    share = max(0, MOST - few) / max(1, total - few)
+    share = max(0, most - few) / max(1, total - few)
     return [solid if len(solid["faces"]) <= primitive else _thin(solid, max(32, int(share * len(solid["faces"])))) for solid in made]
 
 

@@ -27,7 +27,7 @@ for (const root of document.querySelectorAll(".pycraft-sweeps:not([data-ready])"
   const stop = () => { clearInterval(timer); timer = null; play.textContent = "▶"; play.setAttribute("aria-label", "play"); };
   const start = () => {
     if (Number(slider.value) >= film.steps.length - 1) show(0);
-    play.textContent = "⏸", play.setAttribute("aria-label", "pause");
+    play.textContent = "❚❚", play.setAttribute("aria-label", "pause");
     timer = setInterval(() => {
       const next = Number(slider.value) + 1;
       if (next >= film.steps.length) return stop();

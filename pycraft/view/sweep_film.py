@@ -66,6 +66,7 @@ class SweepFilm:
                 f"a film of {len(self._names)} bodies: {MOST} at most are drawn; one of a part, model.subgraph(...), shows the same sweeps"
             )
         self.title = self._written.title
+        self._given = x is not None
         self.steps: list[Step] = self._written.steps(x)
         if not self.steps:
             raise _core.EvaluationError(f"{expression.text()} takes no step: nothing is computed body by body")
@@ -91,8 +92,16 @@ class SweepFilm:
         lines = (f"<div class='line'>{escape('  ' * depth + text)}</div>" for depth, text in self._written.lines())
         return Template(code["html"]).substitute(
             style=code["css"], script=code["js"], title=escape(self.title), figure=picture.figure(), strip=picture.strip(),
-            lines="".join(lines), last=len(self.steps) - 1, data=json.dumps(film).replace("</", "<\\/"),
+            lines="".join(lines), caption=escape(self._caption(picture.has_ellipses)),
+            last=len(self.steps) - 1, data=json.dumps(film).replace("</", "<\\/"),
         )  # fmt: skip
+
+    def _caption(self, ellipses: bool) -> str:
+        """What the pictures show, for who sees them without this page."""
+        applied = "" if self._given else "Applied to x = (1, ..., 1). "
+        shown = "Ellipses: the linear block of the first symmetric 6 × 6 quantity. " if ellipses else ""
+        below = "Below: a row for each quantity, a column for each body; deeper blue where its entries are larger, 0 where all are zero."
+        return f"{applied}{shown}{below}"
 
     def _told(self, step: Step) -> list[Any]:
         """A step as the script reads it: line, lines, pass, direction, body, words."""

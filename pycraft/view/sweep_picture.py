@@ -23,6 +23,11 @@ class SweepPicture:
         self._layout, self._parents, self._names = layout, parents, names
         self._steps = [(i, step) for i, step in enumerate(steps) if step.body >= 0 and step.tree == tree]
 
+    @property
+    def has_ellipses(self) -> bool:
+        """Whether `figure` shows an inertia."""
+        return bool(self._ellipses())
+
     # ------------------------------------------------------------------ the tree
     def figure(self) -> str:
         """Bodies as discs, lines to what carries them, the model's sticks behind, ellipses of inertias."""
@@ -78,6 +83,9 @@ class SweepPicture:
             colour = f"fill='rgba(0,114,178,{_depth(_size(step), largest[key]):.2f})' stroke='currentColor' stroke-opacity='0.2'"
             title = f"{step.letter}({self._names[step.body]})\n{told_value(step)}"
             parts.append(f"<rect class='made' data-step='{i}' {where} {colour}><title>{escape(title)}</title></rect>")
+            if width >= 12 and _size(step) == 0:
+                at = f"x='{_LEFT + width * (step.body + 0.5) - 0.5:.1f}' y='{_ROW * index[key] + 11:g}' text-anchor='middle'"
+                parts.append(f"<text class='zero made' data-step='{i}' {at}>0</text>")
         foot = _ROW * len(rows)
         if width >= 12:
             parts += [
@@ -91,9 +99,11 @@ class SweepPicture:
 
 
 def told_value(step: Step) -> str:
-    """Up to six numbers, else their shape and the largest."""
+    """Up to six numbers, else their shape and the largest; "= 0" where all are exactly zero."""
     if not step.value.size:
         return ""
+    if not step.value.any():
+        return "= 0"
     if step.value.size <= 6:
         return "= " + "  ".join(f"{x:.4g}" for x in step.value.ravel())
     return f"{step.value.shape[0]} × {step.value.shape[1]}, largest entry {_size(step):.4g}"

@@ -26,14 +26,15 @@ def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str],
     Examples
     --------
     >>> from pycraft.view.web_page import web_page
-    >>> "<script>" in web_page("film", "a < b", {"key": "</script>"}, {"said": "", "speeds": ""}).split("</script>")[0]
+    >>> texts = dict.fromkeys(("said", "speeds", "notes", "crossed"), "")
+    >>> "<script>" in web_page("film", "a < b", {"key": "</script>"}, texts).split("</script>")[0]
     False
     """
     own = "'self'" if asks else "'none'"
     policy = f"default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; connect-src {own}"
     body = Template(_text(f"{name}.html")).substitute({"title": escape(title), **texts})
     held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    scripts = "\n".join(_text(f"{script}.js") for script in ("figure", "plots", name)).replace('"use strict";\n', "")
+    scripts = "\n".join(_text(f"{script}.js") for script in ("figure", "camera", "plots", name)).replace('"use strict";\n', "")
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
@@ -41,6 +42,15 @@ def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str],
         f'<style>\n{_text("style.css")}</style>\n</head>\n<body>\n{body}<script type="application/json" id="data">{held}</script>\n'
         f'<script>\n"use strict";\n{scripts}</script>\n</body>\n</html>\n'
     )
+
+
+def notes(unshown: list[str]) -> str:
+    """Why shapes are not shown, as one line that opens; "" where all are."""
+    if not unshown:
+        return ""
+    lines = "".join(f"<li>{escape(line)}</li>" for line in unshown)
+    what = "1 shape is not shown" if len(unshown) == 1 else f"{len(unshown)} shapes are not shown"
+    return f'<details class="notes"><summary>{what} (why?)</summary><ul>{lines}</ul></details>'
 
 
 @cache

@@ -13,6 +13,12 @@ LETTERS = {
     "ℳ": "MM", "ℳ⁻¹": "MM_inv", "M": "M", "P": "P", "D": "D", "φ": "phi", "ψ": "psi", "Υ": "Upsilon", "Ω": "Omega",
 }  # fmt: skip
 """Operators whose blocks are shown, and their names in an operator set."""
+_INERTIAS, _COMPLIANCES = "kg m², kg m and kg by body", "1/(kg m²), 1/(kg m) and 1/kg by body"
+UNITS = {
+    "ℳ": "kg m² and kg by hinge", "ℳ⁻¹": "1/(kg m²) and 1/kg by hinge", "M": _INERTIAS, "P": _INERTIAS, "D": "kg m² and kg by hinge",
+    "φ": "1 and m", "ψ": "1 and m", "Υ": _COMPLIANCES, "Ω": _COMPLIANCES,
+}  # fmt: skip
+"""What the entries of their blocks are, in SI units."""
 MOST = 600
 """Rows of an operator that is formed for its picture."""
 
@@ -49,11 +55,14 @@ def body_numbers(live: LiveScene, name: str) -> dict[str, Any]:
 
 
 def blocks_of(live: LiveScene, letter: str) -> dict[str, Any]:
-    """The largest entry of each block of an operator at the state: "rows", "columns", "values". EvaluationError for what is not shown."""
+    """The largest entry of each block of an operator at the state: "rows", "columns", "values", "units".
+
+    EvaluationError for what is not shown.
+    """
     if letter not in LETTERS:
         raise _core.EvaluationError(f"no blocks of {letter!r} are shown; there are {', '.join(LETTERS)}")
     operator = getattr(live.model.soa, LETTERS[letter])
     if max(operator.shape, default=0) > MOST:
         raise _core.EvaluationError(f"{letter} has {max(operator.shape)} rows; blocks of up to {MOST} are shown")
     view = operator.at(live.q).blocks()
-    return {"rows": view.rows, "columns": view.columns, "values": view.largest().tolist()}
+    return {"rows": view.rows, "columns": view.columns, "values": view.largest().tolist(), "units": UNITS.get(letter, "")}

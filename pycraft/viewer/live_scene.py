@@ -33,6 +33,8 @@ class LiveScene:
     q, v : (nq,), (nv,)
     work : J, of all effects since the state was last put somewhere
     skeleton : Skeleton
+    pushed : Scene or None
+        In place of `scene` while a body is pushed: the same effects, and the push as the last one.
     """
 
     def __init__(self, scene: Any, q: Any = None, v: Any = None):
@@ -41,7 +43,13 @@ class LiveScene:
         self.options = self._options()
         self._first = (self.model.q if q is None else q, self.model.v if v is None else v)
         self.t = 0.0
+        self.pushed: Any = None
         self.reset()
+
+    @property
+    def acting(self) -> Any:
+        """The scene whose effects act."""
+        return self.scene if self.pushed is None else self.pushed
 
     def _options(self) -> RunOptions:
         told = {"integrator": "dopri5", "rtol": 1e-7, "atol": 1e-10, "step": None, **self.scene.run_options}
@@ -103,7 +111,7 @@ class LiveScene:
     # ------------------------------------------------------------------ time
     def advance(self, seconds: float) -> None:
         """Go on by some seconds. What stops a run is raised, and the state is as before."""
-        run = continued(self.scene, self.t, self.t + seconds, self.q, self.v, self.own_states(), self.options)
+        run = continued(self.acting, self.t, self.t + seconds, self.q, self.v, self.own_states(), self.options)
         self.t, self.q, self.v = float(run.t[-1]), run.q[-1], run.v[-1]
         self.work += float(run._work[-1].sum())
         self._keep(run.states[-1])
@@ -111,25 +119,25 @@ class LiveScene:
     # ------------------------------------------------------------------ what is shown
     def along(self) -> dict[str, np.ndarray]:
         """Accelerations "vdot" (nv,), "forces" (effects, nv), "kinetic", "potential" (effects,) at the state."""
-        found = self.scene._calls().along(*self._row())
+        found = self.acting._calls().along(*self._row())
         return {name: x[:, 0] if name == "forces" else x[0] for name, x in found.items()}
 
     def own_states(self) -> np.ndarray:
         """The effects' own states, one effect after the other; of those that have none yet, as they are at first."""
-        counts = self.scene._calls().states
+        counts = self.acting._calls().states
         if not sum(counts):
             return np.zeros(0)
-        names = self.scene._names_on()
+        names = self.acting._names_on()
         if any(count and len(self._kept.get(name, ())) != count for name, count in zip(names, counts, strict=True)):
-            first = continued(self.scene, self.t, self.t + _INSTANT, self.q, self.v, [], self.options).states[0]
+            first = continued(self.acting, self.t, self.t + _INSTANT, self.q, self.v, [], self.options).states[0]
             known, self._kept = self._kept, {}
             self._keep(first)
             self._kept.update({name: own for name, own in known.items() if len(self._kept.get(name, ())) == len(own)})
         return np.concatenate([self._kept[name] for name in names])
 
     def _keep(self, states: np.ndarray) -> None:
-        ends = np.cumsum(self.scene._calls().states)
-        self._kept.update(zip(self.scene._names_on(), np.split(states, ends[:-1]), strict=False))
+        ends = np.cumsum(self.acting._calls().states)
+        self._kept.update(zip(self.acting._names_on(), np.split(states, ends[:-1]), strict=False))
 
     def _row(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         return np.array([self.t]), self.q[None], self.v[None], self.own_states()[None]
@@ -152,7 +160,7 @@ class LiveScene:
 
     def forces(self) -> list[tuple[list[float], list[float]]]:
         """Hinge points and the forces that the hinges put on the bodies there, m and N, in the world. O(N)."""
-        f = forces_of_scene(self.scene._calls(), self.model, *self._row(), None, "world", None, "whole")[0]
+        f = forces_of_scene(self.acting._calls(), self.model, *self._row(), None, "world", None, "whole")[0]
         owners, places = self.skeleton.points["joint"]
         poses = self.skeleton.poses(self.q)[owners]
         at = np.einsum("kij,kj->ki", poses[:, :3, :3], places) + poses[:, :3, 3]
@@ -161,9 +169,14 @@ class LiveScene:
 
 def without(scene: Any, name: str) -> Any:
     """The scene with one effect off: the same model, the same effects, changed with them."""
+    return scene_again(scene, off=name)
+
+
+def scene_again(scene: Any, off: str = "") -> Any:
+    """Another scene with the same model and effects, which change with the first one's, one of them off; more can be added to it."""
     form, refine, residual, precision = scene._how
     other = type(scene)(scene.model, form=form, refine=refine, residual=residual, precision=precision)
     other.run_options = scene.run_options
     for called, effect in scene.effects.items():
-        other._enter(called, effect, scene.is_on(called) and called != name)
+        other._enter(called, effect, scene.is_on(called) and called != off)
     return other

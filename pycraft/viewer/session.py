@@ -16,6 +16,8 @@ from ..scenes.coordinate_units import coordinate_units
 from ..view.figure_data import figure_data, number_text
 from ..view.shares import share_values
 from .effect_fields import set_field, shown_fields
+from .extras import Extras
+from .hands import Push, given_place, lead
 from .inspection import LETTERS, blocks_of, body_numbers
 from .live_scene import LiveScene, without
 
@@ -48,6 +50,8 @@ class Session:
         self.lock = threading.RLock()
         self.playing, self.scale, self.rate, self.message = False, 1.0, 0.0, ""
         self._edits, self._asked, self._seeds = 0, time.monotonic(), 0
+        self.extras = Extras()
+        self._push: Push | None = None
         self._ended = threading.Event()
         self._wake = threading.Event()
         self._thread = threading.Thread(target=self._play, name="pycraft viewer", daemon=True)
@@ -69,7 +73,8 @@ class Session:
                 "effects": [{"name": name, "kind": type(live.scene.effects[name]).__name__, "on": live.scene.is_on(name),
                              "fields": shown_fields(live.scene.effects[name], live.model)} for name in names],
                 "ghosts": [*(["beside"] if self._beside is not None else []), *(f"without {name}" for name in names)],
-                "ghost_name": self.ghost_name, "letters": list(LETTERS), "loops": list(model.loops),
+                "ghost_name": self.ghost_name, "extras": self.extras.shown(live.skeleton),
+                "letters": list(LETTERS), "loops": list(model.loops),
             }  # fmt: skip
 
     def _coordinates(self) -> list[dict[str, Any]]:
@@ -84,6 +89,7 @@ class Session:
             bounded = bool(np.isfinite(low) and np.isfinite(high))
             rows.append({
                 "name": name, "unit": units[j], "body": owners[j], "bounded": bounded,
+                "lower": float(low) if np.isfinite(low) else None, "upper": float(high) if np.isfinite(high) else None,
                 "low": float(low if np.isfinite(low) else min(-wide, high)), "high": float(high if np.isfinite(high) else max(wide, low)),
             })  # fmt: skip
         return rows
@@ -103,6 +109,7 @@ class Session:
                 "ghost": None if ghost is None else number_text(ghost.poses()),
                 "energy": [kinetic, potential, kinetic + potential - live.work],
                 "arrows": drawn, "missing": missing + why, "shade": shaded,
+                "push": None if self._push is None else self._push.shown(live),
             })  # fmt: skip
 
     def body(self, name: str) -> dict[str, Any]:
@@ -121,7 +128,7 @@ class Session:
         actions: dict[str, Callable[..., None]] = {
             "play": self._start, "pause": self.pause, "step": self._step, "reset": self._reset, "neutral": self._neutral,
             "random": self._random, "rest": self._rest, "move": self._move, "scale": self._set_scale, "effect": self._turn,
-            "parameter": self._set, "ghost": self._set_ghost,
+            "parameter": self._set, "ghost": self._set_ghost, "push": self._push_to, "let_go": self._let_go, "lead": self._lead,
         }  # fmt: skip
         if action not in actions:
             raise _core.EvaluationError(f"the viewer has no action {action!r}; there are {', '.join(actions)}")
@@ -171,6 +178,30 @@ class Session:
         self.live.move(j, value)
         self._ghost_follows()
 
+    def _push_to(self, body: Any, place: Any, to: Any) -> None:
+        """A spring from a place of a body to a place in the world, until it is let go; it acts while the scene plays."""
+        name, at, goal = given_place(self.live, body, place, to)
+        if self._push is None or self._push.body != name or not np.array_equal(self._push.place, at):
+            self._let_go()
+            self._push = Push.of(self.live, name, at, goal, self.scale * PIECE)
+            self.live.pushed = self._push.scene
+        self._push.to = goal
+        self._push.act(self.live)
+
+    def _let_go(self) -> None:
+        self._push = self.live.pushed = None
+
+    def _lead(self, body: Any, place: Any, to: Any) -> None:
+        """A place of a body to a place in the world, by inverse kinematics, at rest."""
+        self.message = lead(self.live, *given_place(self.live, body, place, to))
+        self._ghost_follows()
+
+    def draw(self, extra: dict[str, Any] | None, name: str = "") -> None:
+        """Something of a user's code in the picture; None takes it out, by its name, or everything."""
+        with self.lock:
+            self.extras.set(self.live, extra, name)
+            self._edits += 1
+
     def _set_scale(self, to: Any) -> None:
         value = one_number(to, "scale")
         if not SCALES[0] <= value <= SCALES[1]:
@@ -178,6 +209,7 @@ class Session:
         self.scale = value
 
     def _turn(self, name: Any, on: Any) -> None:
+        self._let_go()
         scene = self.live.scene
         if on:
             scene.enable(name)
@@ -188,6 +220,7 @@ class Session:
             self._set_ghost(self.ghost_name)
 
     def _set(self, effect: Any, field: Any, value: Any) -> None:
+        self._let_go()
         set_field(self.live.scene, effect, field, value)
         self._edits += 1
 
@@ -210,6 +243,8 @@ class Session:
 
     # ------------------------------------------------------------------ time
     def _advance(self, seconds: float) -> None:
+        if self._push is not None:
+            self._push.act(self.live)
         self.live.advance(seconds)
         if self.ghost is not None:
             self.ghost.advance(seconds)

@@ -11,7 +11,7 @@ from .. import _core
 from ..arguments import text, whole
 from ..scenes import Scene
 from ..state import at_state
-from ..view.web_page import web_page
+from ..view.web_page import notes, web_page
 from .server import ViewServer
 from .session import Session
 
@@ -40,7 +40,8 @@ class View:
             raise _core.ModelError(f"beside: a second scene, not {beside!r:.80}")
         q, v = at_state(scene.model, q, v)
         self.session = Session(scene, beside, q, v)
-        page = web_page("viewer", scene.model.name, self.session.setup(), {}, asks=True)
+        setup = self.session.setup()
+        page = web_page("viewer", scene.model.name, setup, {"notes": notes(setup["figure"]["unshown"])}, asks=True)
         try:
             self._server = ViewServer(self.session, page, name, number)
         except BaseException:
@@ -57,6 +58,58 @@ class View:
         """Where it is, and who reaches it."""
         return f"{self.address} ({'this machine alone' if self.is_local else f'host {self._server.given_host}: other machines, too'})"
 
+    # ------------------------------------------------------------------ what a user's code shows
+    def frame(self, name: str, pose: Any, on: Any = None, *, size: float | None = None) -> View:
+        """Show axes x, y and z with a name, at a pose (4, 4) or a position (3,) in the world, or on a body or node; returns the view.
+
+        Another thing with this name is replaced. `size` is the length of the axes, m, a tenth of the model's where left out. ModelError for
+        what is no pose; the same of `label`, `line` and `shape`.
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> with pc.mechanisms.double_pendulum().view() as view:
+        ...     view.frame("goal", (1.0, 0.5, 0.0)).label("tip", (1.0, 0, 0), on="lower").shown()
+        ['goal', 'tip']
+        """
+        return self._shows(name, {"kind": "frame", "pose": pose, "size": size}, on, None)
+
+    def label(self, text: str, at: Any, on: Any = None, *, name: str = "", colour: str | None = None) -> View:
+        """Show a text at a point (3,) in the world, or on a body or node; returns the view. `name` is the text where left out."""
+        return self._shows(name or text, {"kind": "label", "text": text, "at": at}, on, colour)
+
+    def line(self, name: str, points: Any, on: Any = None, *, colour: str | None = None) -> View:
+        """Show a line through points (n, 3) in the world, or on a body or node: a path, a target's way; returns the view."""
+        return self._shows(name, {"kind": "line", "points": points}, on, colour)
+
+    def shape(
+        self, name: str, kind: str, size: Any, pose: Any = None, on: Any = None, *, file: str = "", colour: str | None = None
+    ) -> View:
+        """Show a shape at a pose (4, 4) or position (3,) in the world, or on a body or node; returns the view.
+
+        A box (edges), sphere (radius), cylinder or capsule (radius, length along z), ellipsoid (half axes) or mesh (scales, and `file`).
+        """
+        return self._shows(name, {"kind": "shape", "shape": kind, "size": size, "pose": pose, "file": file}, on, colour)
+
+    def remove(self, name: str) -> View:
+        """Take out what code has shown under a name. ModelError where there is none."""
+        self.session.draw(None, text(name, "name"))
+        return self
+
+    def clear(self) -> View:
+        """Take out all that code has shown."""
+        self.session.draw(None)
+        return self
+
+    def shown(self) -> list[str]:
+        """The names of what code has shown."""
+        return list(self.session.extras.given)
+
+    def _shows(self, name: Any, extra: dict[str, Any], on: Any, colour: Any) -> View:
+        self.session.draw({**extra, "on": on, "colour": colour}, text(name, "name"))
+        return self
+
+    # ------------------------------------------------------------------ until when
     def wait(self) -> None:
         """Until Ctrl-C, or until it is closed from elsewhere."""
         while not self._closed:

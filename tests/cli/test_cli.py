@@ -1,5 +1,6 @@
 """The command line: what it prints, and how it ends."""
 
+import csv
 import json
 import re
 from importlib import import_module
@@ -118,6 +119,7 @@ def nothing_measured(monkeypatch):
         ("accuracy panda --duration 2", "--duration belongs to --integration"),
         ("accuracy panda --integration --duration inf", "--duration inf"),
         ("accuracy panda --integration --form ud", "--form and --precision belong to the table of forms"),
+        ("accuracy panda --integration --front", "--front belongs to the table of forms"),
         ("accuracy panda --error 0", "--error 0.0: a relative error, above zero"),
         ("accuracy panda --root sideways", "root='sideways': there are 'fixed', 'free'"),
         ("accuracy panda --mimic sometimes", "mimic='sometimes': there are"),
@@ -147,6 +149,17 @@ def test_the_accuracy_table_and_its_cheapest_row(tmp_path):
     assert {p.name for p in tmp_path.iterdir()} == {"a.csv", "a.png"}
     result = runner.invoke(app, f"accuracy ur5 {QUICK} --root free --error 1e-40".split())
     assert result.exit_code == 1 and "12 degrees of freedom" in result.output and "the best is" in result.output
+
+
+def test_the_front_of_the_accuracy_table(tmp_path):
+    """The terminal shows its rows alone, the files hold all."""
+    result = runner.invoke(app, f"accuracy ur5 {QUICK} --front --csv {tmp_path}/a.csv".split())
+    assert result.exit_code == 0, result.output
+    with open(tmp_path / "a.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    front = [row["way"] for row in rows if row["pareto"] == "True"]
+    shown = [line for line in result.output.splitlines() if line.startswith("fast")]
+    assert len(shown) == len(front) < len(rows)
 
 
 def test_every_row_refused():

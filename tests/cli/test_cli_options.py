@@ -56,7 +56,7 @@ BEFORE = {
 # What changes the output of one measurement is tested below, or where it says.
 AFTER = {
     "check": {"json", "every"},
-    "accuracy": {"error", "csv", "json", "plot"},  # also test_cli.py
+    "accuracy": {"error", "front", "csv", "json", "plot"},  # also test_cli.py
     "stability": {"output", "csv", "json"},
     "bench": {"peers", "quick", "json", "plot", "page"},  # test_speed.py
     "peers": {"output"},  # test_peers.py: `make test-peers`

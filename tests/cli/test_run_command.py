@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -52,6 +53,24 @@ def test_options_go_before_those_of_the_file(scene):
     saved = pc.load_scene("other.toml")
     assert saved.run_options == {"T": 0.2, "rtol": 1e-8, "every": 0.15, "integrator": "rk4", "step": 0.01}
     assert list(saved.effects) == list(scene.effects)
+
+
+LOOKED_AT = [("run.html", b"<!DOCTYPE html>"), ("run.glb", b"glTF"), ("run.usda", b"#usda"), ("run.gltf", b"{")]
+
+
+@pytest.mark.parametrize("name, begins", LOOKED_AT)
+def test_what_is_looked_at_is_written_by_its_ending(scene, name, begins):
+    pytest.importorskip("pygltflib")
+    pytest.importorskip("pxr")
+    assert f"wrote {name}" in run("scene.toml", "-o", name)
+    with open(name, "rb") as file:
+        assert file.read().startswith(begins)
+
+
+def test_a_package_that_is_missing_is_said_before_the_run(scene, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pygltflib", None)
+    monkeypatch.setattr(pc.Scene, "simulate", lambda *_, **__: pytest.fail("simulated"))
+    assert "pip install 'pycraft-soa[gltf]'" in run("scene.toml", "-o", "run.glb", status=2)
 
 
 def test_a_robot_with_effects(here):

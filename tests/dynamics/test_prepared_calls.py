@@ -177,7 +177,8 @@ def test_the_core_takes_what_the_method_takes(call):
     arrays, options = _core.direct_calls()[call]
     method = inspect.signature(getattr(pc.Multibody, call)).parameters
     assert [name for name in method if name in arrays] == list(arrays)
-    other = {"self", "out", "threads", "method", "axes", "relative_to"} | ({"form"} - set(options))  # in other forms by operators
+    other = {"self", "out", "threads", "method", "axes", "relative_to"}
+    other |= {"form", "on_singular", "damping"} - set(options)  # in other forms by operators, at singular states by task spaces
     assert set(method) - other == {*arrays, *options}
     defaults = {name: method[name].default for name in options if name != "frame"}
     model = panda()

@@ -200,3 +200,15 @@ def test_smallest_cases_are_drawn_as_their_trees():
     ax.figure.canvas.draw()
     boxes = [t.get_window_extent() for t in ax.texts]
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+
+
+def test_a_map_is_saved_as_a_page_or_a_picture(tmp_path):
+    found = pc.truth("HG == I", smallest_case=False)
+    page = found.save(tmp_path / "map.html").read_text()
+    assert page.startswith("<!DOCTYPE html>") and found._repr_html_() in page and "src=" not in page
+    for ending, begins in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
+        assert found.save(tmp_path / f"map{ending}").read_bytes().startswith(begins)
+    with pytest.raises(pc.EvaluationError, match="a truth map is written to a file that ends in .html, .png, .svg, .pdf"):
+        found.save(tmp_path / "map.gif")
+    with pytest.raises(FileNotFoundError):
+        found.save(tmp_path / "nowhere" / "map.png")

@@ -4,6 +4,8 @@ The joint Gaussian of all states and measurements is formed densely by NumPy; wh
 no recursion at all. Tolerances are roundings times the condition number of the covariance of the measurements.
 """
 
+import re
+
 import numpy as np
 import pytest
 
@@ -350,6 +352,25 @@ def test_no_measurement_noise():
 def test_what_does_not_fit_is_said(changed, words):
     with pytest.raises(pc.ModelError, match=words):
         kalman(**system(1) | changed)
+
+
+@pytest.mark.parametrize("mechanism", [lambda: pc.chain(2), lambda: pc.chain(2).soa])
+def test_a_mechanism_is_no_state_space_model(mechanism):
+    """The error says what to write, and what it says runs."""
+    with pytest.raises(pc.ModelError, match=r"matrices of a linear state-space model, such as .*\.play\(y, model=arm\)") as refused:
+        kalman(mechanism())
+    example = re.search(r"pc\.kalman\(.*?steps=8\)", str(refused.value)).group()
+    assert eval(example, {"pc": pc, "np": np}).steps == 8
+
+
+def test_what_is_left_out_is_the_identity_but_for_noises():
+    given = dict(A=[[0.9, 0.1], [0, 0.8]], Q=np.eye(2), R=0.5 * np.eye(2), steps=4)
+    y = np.arange(8.0).reshape(4, 2)
+    np.testing.assert_array_equal(kalman(**given).filter(y).filtered, kalman(**given, B=np.eye(2), C=np.eye(2)).filter(y).filtered)
+    with pytest.raises(pc.ModelError, match="give Q, the covariance of the process noise and R, the covariance of the measurement noise"):
+        kalman(0.9)
+    with pytest.raises(pc.ModelError, match="give R, the covariance of the measurement noise, such as"):
+        kalman(0.9, Q=1.0)
 
 
 def test_measurements_that_do_not_fit():

@@ -130,20 +130,59 @@ def copies(model, tmp_path):
     return copy.deepcopy(model), pickle.loads(pickle.dumps(model)), pc.load(tmp_path / "model.toml")
 
 
-def test_a_coupled_hinge_is_not_locked(tmp_path):
-    """Its coordinate would be gone, and the model with it: no rows, no copy, no file."""
+def test_a_coupling_holds_by_the_hinges_that_are_locked(tmp_path):
+    """The row of the others alone, with the value that it had; what it was when they are unlocked, to the last bit."""
     model = closed()
-    before = rows(model, *model.loops)
-    for locking in ("r thigh", "r *", ["l shin", "l thigh"]):
-        with pytest.raises(pc.ModelError, match=r"thigh' is in use: its coordinates are those of coupling 'gear'; remove that first"):
-            model.lock(locking, impulsive=True)
-        assert model.locked == [] and model.nv == 5
-    np.testing.assert_array_equal(rows(model, *model.loops), before)
-    model.lock("? shin", impulsive=True)
+    before, names, Q = rows(model, *model.loops), list(model.loops), model.loops["gear"].jacobian()
+    residual = model.loops.residual()
+    model.lock("r thigh", impulsive=True)
+    assert list(model.loops) == names and model.nv == 4
+    left = [name for name in model.coordinate_names if name != "r thigh"]
+    expected = [1.0 if name == "l thigh" else 0.0 for name in left]
+    np.testing.assert_array_equal(model.loops["gear"].jacobian(), [expected])
+    np.testing.assert_allclose(model.loops.residual(), residual, rtol=1e-15, atol=1e-15)
     for again in copies(model, tmp_path):
-        assert again.nv == 3 and np.array_equal(again.loops.residual(), model.loops.residual())
-    model.loops["gear"].remove()
-    assert model.lock("r thigh", impulsive=True).hinges == ("r thigh",)
+        np.testing.assert_array_equal(again.loops.jacobian(), model.loops.jacobian())
+        np.testing.assert_allclose(again.loops.residual(), model.loops.residual(), rtol=1e-15, atol=1e-15)
+    for again in copies(model, tmp_path)[:2]:
+        again.unlock()
+        np.testing.assert_array_equal(again.loops["gear"].jacobian(), Q)
+    model.unlock()
+    model.q, model.v = closed().q, closed().v
+    np.testing.assert_array_equal(rows(model, *model.loops), before)
+    with pytest.raises(pc.ModelError, match=r"coupling 'gear' would have no coordinate left to hold, of 'l thigh', 'r thigh': lock fewer"):
+        model.lock("? thigh", impulsive=True)
+    assert model.locked == [] and model.nv == 5
+    model.lock("l thigh", impulsive=True)
+    with pytest.raises(pc.ModelError, match="coupling 'gear' would have no coordinate left"):
+        model.lock("r thigh", impulsive=True)
+
+
+def product(q):
+    return q[0] * q[1] - q[2], [q[1], q[0], -1.0], [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+
+
+def test_functions_and_polynomials_with_locked_hinges():
+    """The derivatives of what is left, against those of a coupling that is declared so; motion keeps it."""
+    model = pc.chain(3)
+    model.gravity = (0, -9.81, 0)
+    model.add_coupling(["hinge0", "hinge1", "hinge2"], function=product, name="product")
+    model.add_coupling({"hinge0": [0.5, 1.0, 2.0], "hinge1": [0.0, 0.0, 1.0]}, constant=-1.0, name="poly")
+    model.q = [0.5, 0.7, 0.35]
+    r, Q = model.loops.residual(), model.loops.jacobian()
+    model.lock("hinge0")
+    for one in (model, copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
+        np.testing.assert_allclose(one.loops.residual(), r, rtol=1e-15, atol=1e-15)
+        np.testing.assert_allclose(one.loops.jacobian(), Q[:, 1:], rtol=1e-15)
+        np.testing.assert_allclose(one.loops.bias(v=[2.0, 3.0]), [0.0, 2.0 * 4.0])
+        one.unlock("hinge0")
+        np.testing.assert_array_equal(one.loops.jacobian(), Q)
+    model.loops.remove("poly")
+    model.lock("hinge0")
+    held = model.constrained_dynamics()
+    assert abs(model.loops.jacobian() @ held.vdot).max() < 1e-12
+    run = pc.Scene(model).add(pc.effects.Gravity((0, -9.81, 0)), pc.effects.Loop()).simulate(0.5, model.q, model.v, progress=False)
+    assert abs(0.5 * run.q[:, 0] - run.q[:, 1]).max() < 1e-12
 
 
 def test_bodies_that_a_loop_joins_are_not_made_one(tmp_path):

@@ -2,10 +2,20 @@
 
 CHANGES = {
     "pycraft/viewer/live_scene.py": [
-        ("every piece begins at t = 0", "continued(self.scene, self.t, self.t + seconds", "continued(self.scene, 0.0, seconds"),
+        ("every piece begins at t = 0", "continued(self.acting, self.t, self.t + seconds", "continued(self.acting, 0.0, seconds"),
         ("effects' own states are not kept", "self._keep(run.states[-1])", "pass"),
-        ("the ghost has all effects", " and called != name)", ")"),
+        ("the ghost has all effects", " and called != off)", ")"),
         ("velocities are those of the bodies' origins", " + np.cross(V[:, :3], places)", ""),
+    ],
+    "pycraft/viewer/hands.py": [
+        ("a push has no moment about the body's origin", "np.cross(arm, self.force)", "np.zeros(3)"),
+        ("a push is not damped", " - self.damping * velocity", ""),
+        ("a push is as stiff for light bodies", ", STIFFEST * mass / seconds**2)", ", np.inf)"),
+        ("free hinges are led", 'if kind != "free"', ""),
+    ],
+    "pycraft/scenes/animated_bodies.py": [
+        ("keys may lie on far sides of the sphere", "q[:-1]) < 0", "q[:-1]) < -2"),
+        ("the film is as long as the run", "(times - times[0]) / faster", "times - times[0]"),
     ],
     "pycraft/viewer/server.py": [
         ("foreign origins are answered", "if known and not foreign and", "if known and"),
@@ -382,7 +392,7 @@ CHANGES = {
         ("frames stand where they are now", "model.frame(frame).pose(q, t=t)", "model.frame(frame).pose(q)"),
     ],
     "pycraft/dynamics/hybrid.py": [
-        ("prepared calls of an edited model stay slow", "ready[0] = made()  # of the model as it is now", "pass"),
+        ("prepared calls of an edited model stay slow", "self._ready = self._made()  # of the model as it is now", "pass"),
     ],
     "pycraft/models/structure.py": [
         ("a root moves away from what acts on it", "in scene._acting_on(set(range(free.start, free.stop)))", "in ()"),

@@ -264,3 +264,18 @@ def test_refusals_name_what_it_is(what):
     call, error, text = REFUSED[what]
     with pytest.raises(error, match=text):
         call()
+
+
+def test_an_empty_list_of_independent_coordinates_names_none():
+    """They are chosen then, as by None, in every call that takes them; it was refused by one and taken by the other."""
+    bars = pc.chain(3)
+    bars.gravity = (0, -9.81, 0)
+    bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+    q = bars.assemble([-1.2, 1.2, -1.9], fix="hinge0").q
+    still = np.zeros(3)
+    for none in ([], (), None):
+        swings = bars.linearize(q, still, loops=True, independent=none)
+        assert swings.states == bars.linearize(q, still, loops=True).states
+        assert list(bars.soa.embedded(none, q).independent) == list(bars.soa.embedded(q=q).independent)
+        by_choice = bars.constrained_dynamics(q, still, method="embed", independent=none)
+        assert np.array_equal(by_choice.vdot, bars.constrained_dynamics(q, still, method="embed").vdot)

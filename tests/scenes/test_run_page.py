@@ -114,11 +114,11 @@ def test_events_are_marked():
 
 
 def test_pages_are_small_and_alike(run, tmp_path):
-    """64 bytes a body and frame, and what every page has: under 40 kB."""
+    """64 bytes a body and frame, and what every page has: under 50 kB."""
     page = run.to_html(fps=100)
     assert page.html == run.to_html(fps=100).html
     assert len(held(page)["poses"]) == 64 * 2 * 201
-    assert len(page.html) - len(json.dumps(held(page))) < 40_000
+    assert len(page.html) - len(json.dumps(held(page))) < 50_000
     run.animate(tmp_path / "film.html", fps=30)
     run.to_html(tmp_path / "page.html", fps=30)
     assert (tmp_path / "film.html").stat().st_size > 10 * (tmp_path / "page.html").stat().st_size
@@ -215,3 +215,54 @@ def test_the_figure_turns(browser, film):
         page.mouse.wheel(0, 300)
         page.click("#look")
         assert differing(first, pixels(page)) == 0
+
+
+def test_limits_that_are_left_are_red_while_they_are(browser, tmp_path):
+    """In the heading with the value, and at the hinge in the frames at which it is beyond."""
+    model = pc.Multibody("slide")
+    model.add_body("car", hinge="slider", axis=(1, 0, 0), mass=1.0, inertia=np.eye(3), limits=(-1.0, 1.0))
+    model.add_body("arm", parent="car", hinge="pin", axis=(0, 1, 0), mass=1.0, com=(0, 0, 0.5), inertia=np.eye(3))
+    with pytest.warns(pc.models.warning.ModelWarning, match="car reached"):
+        run = pc.Scene(model).add(pc.effects.Spring(4.0, hinges="car")).simulate(4.0, [0.0, 0.0], [4.0, 0.0], progress=False)
+    page = run.to_html(fps=20)
+    q = run.at(page.times).q[:, 0]
+    (beyond,) = [one for one in held(page)["beyond"] if one["spans"][0][0] < np.argmax(q < -1)]
+    frames = {k for first, last in beyond["spans"] for k in range(first, last + 1)}
+    assert beyond["body"] == 0 and frames == set(np.flatnonzero(q > 1 + 1e-9).tolist()) and 0 < len(frames) < len(q)
+    with opened(browser, page.save(tmp_path / "run.html").as_uri()) as shown:
+        assert shown.inner_text(".crossed") == "beyond limits: car"
+        assert re.fullmatch(r"car reached \S+ \(limit -1.*; car reached \S+ \(limit 1.*", shown.get_attribute(".crossed", "title"))
+        for frame, red in ((0, 0), (min(frames), 1)):
+            shown.fill("#time", str(frame))
+            assert shown.evaluate("figure.beyond.size") == red
+    held_by = pc.Scene(model).add(pc.effects.Limits()).simulate(0.5, [0.0, 0.0], [4.0, 0.0], progress=False).to_html()
+    assert held(held_by)["beyond"] == [] and 'class="crossed"' not in held_by.html
+
+
+def test_what_falls_far_is_followed(browser, tmp_path):
+    """A loose robot fills the picture while it falls; one that stays where it is is not followed."""
+    dog = pc.robots.a1()
+    scene = pc.Scene(dog).add(pc.effects.Gravity((0, 0, -9.81)))
+    q = dog.clamped(dog.neutral())
+    fall = scene.simulate(1.0, q, progress=False).to_html(fps=10)
+    assert held(fall)["follow"] == "robot"
+    assert held(scene.simulate(0.1, q, progress=False).to_html())["follow"] == ""
+    assert held(pc.mechanisms.double_pendulum().simulate(0.2).to_html())["follow"] == ""
+    with opened(browser, fall.save(tmp_path / "fall.html").as_uri()) as page:
+        assert page.input_value("#follow") == "robot"
+        for frame in ("0", "10"):
+            page.fill("#time", frame)
+            places = page.evaluate("figure.data.bodies.map((_, k) => figure.seen(placed(figure.poses, k, [0, 0, 0])))")
+            size = np.ptp(np.array(places)[:, :2], axis=0)
+            box = page.locator("#figure").bounding_box()
+            assert size.max() > 0.3 * min(box["width"], box["height"])
+            middle = np.array(places)[:, :2].mean(axis=0)
+            assert middle == pytest.approx([box["width"] / 2, box["height"] / 2], abs=1.0)
+
+
+def test_meshes_that_are_missing_are_one_line(tmp_path):
+    from pycraft.view.web_page import notes
+
+    assert notes([]) == "" and "1 shape is not shown" in notes(["a"])
+    many = notes([f"mesh {i} <is> missing" for i in range(7)])
+    assert "<summary>7 shapes are not shown (why?)</summary>" in many and "mesh 6 &lt;is&gt; missing" in many

@@ -51,3 +51,23 @@ def test_what_there_is_not():
         run.plot(coordinates="bib")
     with pytest.raises(pc.EvaluationError, match="plot: there is nothing to see of 'forces' in this run"):
         pc.Scene(run.model).simulate(0.1, [0.0], [1.0]).plot("forces")
+
+
+def test_many_events_are_thinned():
+    """A plot with a line for each of some thousand events is black: those nearest to even times stand for all, and the heading says so."""
+    from pycraft.scenes.run_plots import MARKS, event_marks
+
+    scene = pc.mechanisms.double_pendulum()
+    few = scene.simulate(1.0, q=[1.0, 2.0], events={"turn": lambda t, s: s.v[-1]})
+    times = sorted(t for event in few.events.values() for t in event.t)
+    assert event_marks(few) == (times, "") and len(times) < MARKS
+    many = scene.simulate(1.0, q=[1.0, 2.0], max_step=1e-3, events={"ring": lambda t, s: np.sin(500 * t)})
+    times = many.events["ring"].t
+    marks, said = event_marks(many)
+    assert len(times) > 2 * MARKS and len(marks) <= MARKS and said == f"vertical lines: {len(marks)} of {len(times)} events"
+    assert set(marks) <= set(times) and marks == sorted(marks) and marks[0] == times[0] and marks[-1] == times[-1]
+    widest = np.diff(times).max()
+    assert np.diff(marks).max() <= (times[-1] - times[0]) / (MARKS - 1) + widest  # even, but for where no event is
+    figure = many.plot("energy")
+    assert said in figure.get_suptitle() and sum(len(line.get_xdata()) == 2 for line in figure.axes[0].lines) == len(marks)
+    assert said in many.to_html().html and said not in few.to_html().html

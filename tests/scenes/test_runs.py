@@ -146,7 +146,7 @@ def test_ctrl_c_keeps_what_was_computed(integrator):
 
 def test_progress_is_shown_in_a_terminal(monkeypatch, capsys):
     """A bar with the time, the rate and the time left, after a second; nothing where there is no terminal."""
-    from pycraft.scenes import progress_bar
+    from pycraft import progress_bar
 
     scene = pc.mechanisms.double_pendulum()
     monkeypatch.setattr(progress_bar, "SECONDS", 0.0)

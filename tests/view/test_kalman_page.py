@@ -88,7 +88,7 @@ def test_other_chains_and_forces():
     y = np.ravel(by_letter(page.mechanics_steps, "y", 3))
     np.testing.assert_allclose(y, np.linalg.solve(model.mass_matrix(), [1.0, 0, 0]), rtol=1e-10)
     one = track(1).play([1.0])
-    assert repr(one) == "<filter beside 'tree of 1': 11 steps of 1 times and bodies>"
+    assert repr(one) == "<filter beside 'chain of 1 rods': 11 steps of 1 times and bodies>"
     data = told(one)
     assert [data[name] for name in ("measured", "predicted", "smoothed")] == [[[1.0]]] * 3  # x0 is what was measured
     assert data["deviation"] == [[pytest.approx(np.sqrt(1.2), rel=1e-5)]] and not any(

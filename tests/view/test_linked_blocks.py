@@ -39,6 +39,17 @@ def test_blocks_know_their_bodies(order):
     assert list(arm.soa._source.body_names)[rows] == arm.nodes[tip].body.name
 
 
+def test_squares_that_have_room_show_their_number():
+    view = TREE.soa.MM.blocks()
+    page = view.on_robot()._repr_html_()
+    shown = [float(x) for x in re.findall(r"<text class='entry'[^>]*>([^<]*)</text>", page)]
+    largest = view.largest()[view.largest() != 0]
+    np.testing.assert_allclose(shown, largest, rtol=0.05)  # two figures
+    assert "the number is its largest entry" in page and "Point at a block" in page
+    many = pc.chain(40).soa.MM.blocks().on_robot()._repr_html_()
+    assert "class='entry'" not in many and "the number is its largest entry" not in many
+
+
 def test_what_cannot_be_linked_is_refused(tmp_path):
     with pytest.raises(pc.EvaluationError, match="'robot'.*'tree'"):
         TREE.soa.phi.blocks().on_robot("moon")

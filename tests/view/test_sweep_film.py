@@ -189,6 +189,24 @@ def test_bodies_at_one_place_are_drawn_side_by_side():
         assert np.linalg.norm(layout.bodies[:, None] - layout.bodies[None], axis=2)[np.triu_indices(n, 1)].min() >= 0.94 * 2.2 * 7
 
 
+def test_zeros_are_marked_and_the_pictures_are_explained():
+    model = pc.chain(3)
+    tip = np.array([0.0, 0.0, 1.0])
+    page = inverse(model).play(tip)._repr_html_()
+    film = inverse(model).play(tip)
+    zeros = [i for i, step in enumerate(film.steps) if step.body >= 0 and step.value.size and not step.value.any()]
+    assert zeros and sorted(map(int, re.findall(r"class='zero made' data-step='(\d+)'", page))) == zeros
+    told = script_of(page)["steps"]
+    assert all(told[i][-1].endswith("\n= 0") for i in zeros)
+    assert "a row for each quantity, a column for each body" in page and "Applied to x" not in page
+    assert "Applied to x = (1, ..., 1)." in inverse(model).play()._repr_html_()
+
+
+def test_the_button_that_pauses_is_drawn_by_every_font():
+    """U+23F8 is an empty box in many; the other pages have two heavy bars."""
+    assert "⏸" not in inverse(pc.chain(2)).play()._repr_html_() and "❚❚" in inverse(pc.chain(2)).play()._repr_html_()
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("chromium"), reason="needs chromium")
 def test_a_browser_plays_it(tmp_path):

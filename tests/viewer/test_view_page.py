@@ -112,7 +112,7 @@ def test_blocks_follow_the_pose(browser, view):
         page.wait_for_timeout(700)  # blocks are asked for some times a second
         assert differing(first, pixels(page, "#blocks")) > 30
         box = page.locator("#blocks").bounding_box()
-        page.mouse.move(box["x"] + 20, box["y"] + 20)
+        page.mouse.move(box["x"] + 80, box["y"] + 80)  # beside the names of rows and below those of columns
         largest = view.session.live.model.mass_matrix(view.session.live.q)[0, 0]
         name, shown = page.inner_text("#block").rsplit(": ", 1)
         assert name == "upper, upper" and float(shown) == pytest.approx(largest, rel=1e-12)
@@ -254,8 +254,8 @@ def test_limits_and_the_frame_of_what_is_picked(browser):
     arm = pc.robots.panda()
     with arm.view() as view, shown_page(browser, view) as page:
         ready(page)
-        first = page.inner_text(".slider span >> nth=0")
-        low, high = (float(x) for x in first.removeprefix("panda_joint1").split("…"))
+        assert page.inner_text(".slider span >> nth=0") == "panda_joint1"
+        low, high = (float(page.inner_text(f".slider small >> nth={i}")) for i in (0, 1))
         assert [low, high] == pytest.approx([float(page.get_attribute("#u0", end)) for end in ("min", "max")], rel=5e-3)
         without = pixels(page)
         page.click("#tree button >> nth=3")
@@ -266,3 +266,210 @@ def test_limits_and_the_frame_of_what_is_picked(browser):
             near = picture[int(y) - 3 : int(y) + 4, int(x) - 3 : int(x) + 4]
             assert (np.abs(near - np.array(colour) / 255).max(axis=-1) < 0.1).any()  # x, y and z of its frame in their colours
         assert differing(without, picture) > 60
+
+
+def test_a_limit_that_is_crossed_is_marked(browser):
+    """At its slider, in the heading and in the figure; what no limit holds is not, and the mark goes with the reason."""
+    model = pc.Multibody("arm")
+    rod = dict(mass=1.0, com=(0.5, 0, 0), inertia=np.diag([0.01, 0.1, 0.1]), hinge="pin", axis=(0, 1, 0))
+    model.add_body("upper", **rod, limits=(-1.0, 0.5))
+    model.add_body("lower", parent="upper", position=(1, 0, 0), **rod)
+    with model.view() as view, shown_page(browser, view) as page:
+        ready(page)
+        assert page.inner_text("#beyond") == "" and page.locator(".slider.beyond").count() == 0
+        before = pixels(page)
+        view.session.do("move", coordinate=1, to=3.0)
+        until(page, "state.u[1] === 3")
+        assert page.inner_text("#beyond") == ""
+        view.session.do("move", coordinate=1, to=0.0)
+        view.session.do("move", coordinate=0, to=0.5)
+        until(page, "state.u[0] === 0.5")
+        assert page.inner_text("#beyond") == ""  # at it is not beyond it
+        view.session.do("move", coordinate=0, to=0.7)
+        until(page, "figure.beyond.size === 1")
+        assert page.inner_text("#beyond") == "beyond limits: upper" and page.evaluate("[...figure.beyond]") == [0]
+        assert page.inner_text(".slider.beyond span") == "upper" and page.inner_text("small.crossed") == "0.5"
+        red = np.array([208, 0, 0]) / 255
+        assert (np.abs(pixels(page) - red).max(axis=-1) < 0.05).sum() > 30 > (np.abs(before - red).max(axis=-1) < 0.05).sum()
+        view.session.do("move", coordinate=0, to=-2.0)
+        until(page, "state.u[0] === -2")
+        assert page.inner_text("small.crossed") == "-1"
+
+
+def test_shapes_come_first_and_sticks_when_asked_for(browser):
+    with pc.robots.panda().view() as view, shown_page(browser, view) as page:
+        ready(page)
+        assert page.is_checked("#solid") and not page.is_checked("#sticks")
+        assert page.evaluate("figure.items.every((item) => figure.beyond.has(item.body))")  # every body of it has a shape
+        clad = pixels(page)
+        page.check("#sticks")
+        assert page.evaluate("figure.items.length") > 7 and differing(clad, pixels(page)) > MOVED
+        page.uncheck("#sticks")
+        assert differing(clad, pixels(page)) == 0
+        page.uncheck("#solid")
+        assert page.evaluate("figure.items.length") > 7  # nothing would be seen else
+    with pc.chain(2).view() as view, shown_page(browser, view) as page:
+        ready(page)
+        assert page.locator("#sticks").count() == 0 and page.evaluate("figure.items.length") > 2
+
+
+def test_the_wheel_zooms_at_the_pointer(browser):
+    with pc.robots.panda().view() as view, shown_page(browser, view) as page:
+        ready(page)
+        box = page.locator("#figure").bounding_box()
+        x, y = 0.3 * box["width"], 0.6 * box["height"]
+        there, scale = page.evaluate("([x, y]) => [figure.unseen(x, y, 0.1), figure.scale]", [x, y])
+        assert page.evaluate("p => figure.seen(p)", there) == pytest.approx([x, y, 0.1], abs=1e-6)
+        page.mouse.move(box["x"] + x, box["y"] + y)
+        page.mouse.wheel(0, -500)
+        until(page, f"figure.scale > 1.5 * {scale!r}")
+        assert page.evaluate("p => figure.seen(p)", there)[:2] == pytest.approx([x, y], abs=1.0)  # a pixel: places of events are whole
+        for _ in range(40):
+            page.mouse.wheel(0, -2000)
+        until(page, "figure.zoom === NEAREST")
+        page.click("#look")
+        assert page.evaluate("figure.zoom") == 1 and page.evaluate("figure.scale") == pytest.approx(scale)
+
+
+def test_the_camera_follows(browser):
+    model = pc.Multibody("thrown")
+    model.add_body("box", hinge="free", mass=1.0, inertia=np.eye(3) / 6)
+    with pc.Scene(model).view(v=[0, 0, 0, 5.0, 0, 0]) as view, shown_page(browser, view) as page:
+        ready(page)
+        middle = page.evaluate("figure.seen([0, 0, 0])")
+        page.select_option("#follow", "robot")
+        view.session.do("scale", to=60)
+        page.click("#step")
+        until(page, "state.t > 1")
+        at = view.session.live.model.pose("box", view.session.live.q)[:3, 3].tolist()
+        assert np.linalg.norm(at) > 5
+        x, y, _ = page.evaluate("p => figure.seen(p)", at)
+        width, height = page.evaluate("[figure.canvas.clientWidth / 2, figure.canvas.clientHeight / 2]")
+        assert [x, y] == pytest.approx([width, height], abs=1.0) and middle[:2] != [x, y]
+        page.select_option("#follow", "0")
+        assert page.evaluate("p => figure.seen(p)", at)[:2] == pytest.approx([width, height], abs=1.0)
+        page.select_option("#follow", "")
+        assert page.evaluate("p => figure.seen(p)", at)[0] > 2 * width
+
+
+@pytest.mark.parametrize("name, axes", [("side", ("x", "z")), ("front", ("y", "z")), ("top", ("x", "y"))])
+def test_directions_to_look_from(browser, name, axes):
+    with pc.robots.panda().view() as view, shown_page(browser, view) as page:
+        ready(page)
+        page.select_option("#direction", name)
+        across, up, _ = page.evaluate("figure.basis()")
+        assert across == pytest.approx(np.eye(3)["xyz".index(axes[0])], abs=1e-3)
+        assert up == pytest.approx(np.eye(3)["xyz".index(axes[1])], abs=1e-3)
+        page.select_option("#direction", "")
+        assert page.evaluate("[figure.yaw, figure.pitch]") == [0.6, 0.35]
+
+
+def grabbed(page, body, place):
+    """Where a place of a body is on the screen."""
+    box = page.locator("#figure").bounding_box()
+    x, y, _ = page.evaluate("([body, place]) => figure.seen(placed(figure.poses, body, place))", [body, place])
+    return box["x"] + x, box["y"] + y
+
+
+def test_a_body_is_pushed_with_the_mouse(browser, view):
+    """Ctrl and drag: the scene plays, the body follows the pointer, and the push ends with the button."""
+    view.session.live.put([0.3, 0.9], [0.0, 0.0])
+    view.session.do("effect", name="gravity", on=False)
+    with shown_page(browser, view) as page:
+        ready(page)
+        x, y = grabbed(page, 1, [0.5, 0, 0])
+        yaw = page.evaluate("figure.yaw")
+        page.keyboard.down("Control")
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 40, y - 30, steps=4)
+        until(page, "state.playing && state.push !== null && state.t > 0.1")
+        assert view.session.live.acting is not view.session.live.scene and page.evaluate("figure.yaw") == yaw
+        assert "push: " in page.inner_text("#longest") and page.evaluate("state.u[0] !== 0.3")
+        page.mouse.up()
+        page.keyboard.up("Control")
+        until(page, "state.push === null")
+        assert view.session.live.acting is view.session.live.scene and page.inner_text("#picked_name") == "lower"
+
+
+def test_a_body_is_led_with_the_mouse(browser):
+    arm = pc.robots.panda()
+    q = np.array([0, 0.3, 0, -1.5, 0, 1.8, 0])
+    with pc.Scene(arm).view(q=q) as view, shown_page(browser, view) as page:
+        ready(page)
+        page.select_option("#hand", "lead")
+        x, y = grabbed(page, 6, [0, 0, 0])
+        before = arm.pose("panda_link7", q)[:3, 3]
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 30, y + 25, steps=5)
+        until(page, "hands.sent === null && state.u[1] !== 0.3")
+        page.wait_for_timeout(300)
+        page.mouse.up()
+        after = arm.pose("panda_link7", view.session.live.q)[:3, 3]
+        scale, (across, up, _) = page.evaluate("[figure.scale, figure.basis()]")
+        moved = np.array([np.dot(after - before, across), -np.dot(after - before, up)]) * scale
+        assert moved == pytest.approx([30, 25], abs=12)  # the hand is turned as well: the place that is held is not its origin
+        assert not view.session.live.v.any() and not view.session.playing
+
+
+def test_what_is_seen_is_saved(browser, view, tmp_path):
+    with shown_page(browser, view) as page:
+        ready(page)
+        with page.expect_download() as download:
+            page.click("#picture")
+        assert download.value.suggested_filename == "double pendulum.png"
+        download.value.save_as(tmp_path / "picture.png")
+        from matplotlib.image import imread
+
+        picture = imread(tmp_path / "picture.png")
+        assert (picture[..., 3] == 1).all() and picture[..., :3].std() > 0.01  # no hole where the page was
+        page.click("#record")
+        assert page.inner_text("#record") == "stop"
+        page.click("#play")
+        until(page, "state.t > 0.5")
+        with page.expect_download() as download:
+            page.click("#record")
+        download.value.save_as(tmp_path / "film.webm")
+        film = (tmp_path / "film.webm").read_bytes()
+        assert film[:4] == b"\x1a\x45\xdf\xa3" and len(film) > 2000  # EBML, which WebM is
+        until(page, "document.getElementById('record').textContent === 'record'")
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_a_phone_has_one_column(browser, dark):
+    """What plays stands below the figure, nothing lies over anything, nothing is wider than the screen."""
+    with pc.robots.panda().view() as view, opened(browser, view.address, size=(390, 844), dark=dark) as page:
+        ready(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        parts = ["header", "#figure", ".bar >> nth=0", "#camera", "#left", "#plots"]
+        boxes = [page.locator(part).first.bounding_box() for part in parts]
+        for above, below in zip(boxes, boxes[1:], strict=False):
+            assert above["y"] + above["height"] <= below["y"] + 1
+        assert boxes[1]["height"] > 0.5 * 844
+
+
+def test_blocks_have_names_and_units(browser):
+    with pc.robots.panda().view() as view, shown_page(browser, view) as page:
+        ready(page)
+        assert not page.is_visible("#blocks")
+        page.select_option("#letter", "ℳ")
+        until(page, "document.getElementById('blocks').onpointermove !== null")
+        assert page.inner_text("#block") == "largest entry of each block, kg m² and kg by hinge"
+        without = page.evaluate("""() => { const { width, height } = document.getElementById('blocks');
+            const data = document.getElementById('blocks').getContext('2d').getImageData(0, 0, 60, height).data;
+            return data.filter((x, i) => i % 4 === 3 && x > 100).length; }""")
+        assert without > 200  # ink of the names on the left
+        page.click("#tree button >> nth=3")
+        until(page, "document.querySelectorAll('#numbers td').length > 60")
+        assert "M (kg m², kg m; kg m, kg)" in page.inner_text("#numbers")
+        cut = "[...document.querySelectorAll('#numbers td')].filter((td) => td.scrollWidth > td.clientWidth + 1).length"
+        assert page.evaluate(cut) == 0 and page.evaluate(
+            "document.getElementById('numbers').scrollWidth <= document.getElementById('numbers').clientWidth"
+        )
+
+
+def test_what_acts_on_all_says_so(view):
+    fields = {effect["name"]: effect["fields"] for effect in view.session.setup()["effects"]}
+    assert {"name": "hinges", "text": "all hinges"} in fields["damping"]
+    assert all("None" not in field.get("text", "") for own in fields.values() for field in own)

@@ -159,7 +159,7 @@ class Certificate:
             for name, number, remark in self.lines()
         )
         title = f"{self.what}: {self.rung.label}" + ("" if self.rung.precision != "double" else ", double")
-        return f"<p><b>{escape(title)}</b></p><table>{rows}</table><p>{escape(self.verdict())}</p>"
+        return f"<p><b>{escape(title)}</b></p><table style='table-layout:auto'>{rows}</table><p>{escape(self.verdict())}</p>"
 
 
 def rounding_level(precision: Any) -> float:

@@ -1,6 +1,7 @@
 "use strict";
-// The stick figure of a model on a canvas: points and lines that are fixed on bodies, placed by the bodies' poses, seen by a camera that is
-// turned (drag), moved (Shift and drag) and brought nearer (wheel). Parallel projection: lengths in the plane of the picture are true.
+// A model on a canvas: its shapes, and a stick figure of what has none, placed by the bodies' poses and seen by a camera that is turned (drag),
+// moved (Shift and drag, or two fingers) and brought nearer (wheel, or two fingers), toward the pointer. The projection is parallel
+// (orthographic): lengths in the plane of the picture are true.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -29,10 +30,19 @@ function turned(poses, owner, d) {
   return [0, 4, 8].map((i) => X[i] * d[0] + X[i + 1] * d[1] + X[i + 2] * d[2]);
 }
 
+// Directions that the figure is seen from: yaw and pitch, rad.
+const VIEWS = { "from above": [0.6, 0.35], "side": [0, 0], "front": [Math.PI / 2, 0], "back": [-Math.PI / 2, 0], "top": [0, Math.PI / 2] };
+const NEAREST = 400, FARTHEST = 0.02; // of the zoom, 1 at first
+
 class Figure {
-  // data: what pycraft/view/figure_data.py says of a model; picked(body): a body was clicked, -1 for none
-  constructor(canvas, data, picked = () => {}) {
-    Object.assign(this, { canvas, data, picked, poses: new Float32Array(), ghosts: [], arrows: [], way: null, chosen: -1, shade: null, solid: true });
+  // data: what pycraft/view/figure_data.py says of a model; picked(body): a body was clicked, -1 for none; hands: what a body that is held by
+  // the pointer is told to, { holding(event): whether it is held and not turned, begin(body, place), move(body, place, to), end(body) }, places in
+  // the body's frame and the world
+  constructor(canvas, data, picked = () => {}, hands = null) {
+    Object.assign(this, {
+      canvas, data, picked, hands, poses: new Float32Array(), ghosts: [], arrows: [], way: null, chosen: -1, shade: null, solid: true,
+      sticks: !data.solids.length, beyond: new Set(), extras: [], follow: "", opaque: false,
+    });
     this.context = canvas.getContext("2d");
     this.look();
     this.listen();
@@ -41,10 +51,28 @@ class Figure {
 
   // The camera as at first: the plane of a flat model, else from the side and above.
   look() {
-    [this.yaw, this.pitch] = this.data.flat ? [0, 0] : [0.6, 0.35];
+    [this.yaw, this.pitch] = this.data.flat ? [0, 0] : VIEWS["from above"];
     this.zoom = 1;
-    this.centre = this.data.centre;
+    this.centre = this.followed() || this.data.centre;
     this.draw();
+  }
+
+  lookFrom([yaw, pitch]) {
+    [this.yaw, this.pitch] = [yaw, pitch];
+    this.draw();
+  }
+
+  // "" nothing, "robot" the middle of its bodies, or the number of a body: the camera goes with it.
+  setFollow(what) {
+    this.follow = what;
+    this.look();
+  }
+
+  // Where what the camera follows is; null where it follows nothing.
+  followed() {
+    if (this.follow === "" || this.poses.length < 12) return null;
+    const count = this.data.bodies.length, of = this.follow === "robot" ? [...Array(count).keys()] : [+this.follow];
+    return [3, 7, 11].map((i) => of.reduce((sum, k) => sum + this.poses[12 * k + i], 0) / of.length);
   }
 
   basis() {
@@ -57,39 +85,89 @@ class Figure {
   }
 
   listen() {
-    const { canvas } = this;
-    let from = null, moved = 0;
+    const { canvas } = this, fingers = new Map();
+    let moved = 0, held = null;
     canvas.addEventListener("pointerdown", (event) => {
-      [from, moved] = [[event.offsetX, event.offsetY], 0];
+      fingers.set(event.pointerId, [event.offsetX, event.offsetY]);
       canvas.setPointerCapture(event.pointerId);
+      moved = 0;
+      if (fingers.size > 1) return this.release(held), (held = null);
+      const hit = this.hands?.holding(event) ? this.hitAt(event.offsetX, event.offsetY) : { body: -1 };
+      if (hit.body < 0) return;
+      const at = this.unseen(event.offsetX, event.offsetY, hit.depth);
+      held = { body: hit.body, at, place: withinBody(this.poses, hit.body, at) };
+      this.hands.begin(held.body, held.place);
     });
     canvas.addEventListener("pointermove", (event) => {
+      const from = fingers.get(event.pointerId), to = [event.offsetX, event.offsetY];
       if (!from) return;
-      const [dx, dy] = [event.offsetX - from[0], event.offsetY - from[1]];
-      from = [event.offsetX, event.offsetY];
+      const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+      if (fingers.size === 2) return this.pinch(fingers, event.pointerId, to);
+      fingers.set(event.pointerId, to);
       moved += Math.abs(dx) + Math.abs(dy);
       if (moved < 4) return;
+      if (held) { // in the plane of the picture through the place that is held
+        held.at = this.unseen(...to, this.seen(held.at)[2]);
+        this.hands.move(held.body, held.place, held.at);
+        return;
+      }
       if (event.shiftKey || event.buttons > 1) {
-        const [across, up] = this.basis();
-        this.centre = along(along(this.centre, -dx / this.scale, across), dy / this.scale, up);
+        this.shift(dx, dy);
       } else {
         this.yaw -= 0.008 * dx;
         this.pitch = Math.max(-1.57, Math.min(1.57, this.pitch + 0.008 * dy));
       }
       this.draw();
     });
-    canvas.addEventListener("pointerup", (event) => {
-      if (from && moved < 4) this.picked(this.bodyAt(event.offsetX, event.offsetY));
-      from = null;
-    });
-    canvas.addEventListener("pointercancel", () => { from = null; });
+    const lifted = (event) => {
+      if (event.type === "pointerup" && fingers.size === 1 && moved < 4 && !held) this.picked(this.bodyAt(event.offsetX, event.offsetY));
+      fingers.delete(event.pointerId);
+      this.release(held);
+      held = null;
+    };
+    canvas.addEventListener("pointerup", lifted);
+    canvas.addEventListener("pointercancel", lifted);
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
-      this.zoom *= Math.exp(-0.0012 * event.deltaY);
-      this.draw();
+      this.zoomAt(event.offsetX, event.offsetY, Math.exp(-0.0012 * event.deltaY));
     }, { passive: false });
     canvas.addEventListener("dblclick", () => this.look());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+  }
+
+  release(held) {
+    if (held) this.hands.end(held.body);
+  }
+
+  // Two fingers: what is between them stays between them.
+  pinch(fingers, id, to) {
+    const other = [...fingers].find(([known]) => known !== id)[1], from = fingers.get(id);
+    const apart = (a) => Math.max(1, Math.hypot(a[0] - other[0], a[1] - other[1]));
+    const factor = apart(to) / apart(from);
+    fingers.set(id, to);
+    this.shift((to[0] - from[0]) / 2, (to[1] - from[1]) / 2);
+    this.zoomAt((to[0] + other[0]) / 2, (to[1] + other[1]) / 2, factor);
+  }
+
+  // The picture by some pixels.
+  shift(dx, dy) {
+    const [across, up] = this.basis();
+    this.centre = along(along(this.centre, -dx / this.scale, across), dy / this.scale, up);
+  }
+
+  // Nearer or farther, and what is seen at a place of the picture stays there.
+  zoomAt(x, y, factor) {
+    const zoom = Math.max(FARTHEST, Math.min(NEAREST, factor * this.zoom)), less = (1 - this.zoom / zoom) / this.scale;
+    const [across, up] = this.basis(), { clientWidth: width, clientHeight: height } = this.canvas;
+    this.centre = along(along(this.centre, (x - width / 2) * less, across), (height / 2 - y) * less, up);
+    this.zoom = zoom;
+    this.draw();
+  }
+
+  // The point in the world that is seen at a place of the picture, at a depth as `seen` gives it.
+  unseen(x, y, depth) {
+    const [across, up, toward] = this.basis(), { clientWidth: width, clientHeight: height } = this.canvas;
+    return along(along(along(this.centre, (x - width / 2) / this.scale, across), (height / 2 - y) / this.scale, up), depth, toward);
   }
 
   // Pixels a metre, and where things are seen.
@@ -99,7 +177,8 @@ class Figure {
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
       [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     }
-    const span = (axis) => 2 * axis.reduce((sum, x, i) => sum + Math.abs(x) * data.half[i], 0);
+    const half = this.follow === "" ? data.half : data.near; // what is followed fills the picture, not its way
+    const span = (axis) => 2 * axis.reduce((sum, x, i) => sum + Math.abs(x) * half[i], 0);
     const axes = this.basis();
     this.scale = this.zoom * 0.9 * Math.min(width / span(axes[0]), height / span(axes[1]));
     this.seen = (p) => {
@@ -108,10 +187,16 @@ class Figure {
     };
     this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.context.clearRect(0, 0, width, height);
+    if (!this.opaque) return;
+    this.context.fillStyle = colourOf("--page"); // films and pictures have no page behind them
+    this.context.fillRect(0, 0, width, height);
   }
 
   show(poses) {
+    const before = this.followed();
     this.poses = poses;
+    const now = this.followed();
+    if (now) this.centre = before ? along(along(this.centre, 1, now), -1, before) : now;
     this.draw();
   }
 
@@ -124,6 +209,7 @@ class Figure {
     this.drawModel(this.data, this.poses, 1, null);
     if (this.chosen >= 0 && this.poses.length) this.drawFrame(this.chosen);
     for (const arrow of this.arrows) this.drawArrow(arrow);
+    for (const extra of this.extras) this.drawExtra(extra);
     this.drawScale();
     if (this.shade) this.drawShade();
   }
@@ -138,9 +224,10 @@ class Figure {
   }
 
   drawFloor() {
-    const { floor, half, centre, right, up } = this.data, front = cross(right, up);
-    const reach = Math.max(...half), pitch = niceStep(reach / 4), lines = 6;
-    const middle = along(centre, floor - dot(centre, up), up);
+    const { floor, half, near, right, up } = this.data, front = cross(right, up), follows = this.follow !== "";
+    const reach = Math.max(...(follows ? near : half)), pitch = niceStep(reach / 4), lines = 6, centre = follows ? this.centre : this.data.centre;
+    const onGrid = (axis) => pitch * Math.round(dot(centre, axis) / pitch); // the lines stand still under a camera that goes
+    const middle = along(along(up.map((x) => floor * x), onGrid(right), right), onGrid(front), front);
     for (let i = -lines; i <= lines; i++) {
       for (const [a, b] of [[right, front], [front, right]]) {
         const at = along(middle, i * pitch, a);
@@ -206,13 +293,15 @@ class Figure {
 
   drawModel(data, poses, alpha, colour) {
     if (poses.length < 12 * data.bodies.length) return;
-    const { context } = this, items = [];
+    const { context } = this, items = [], solids = colour ? data.solids : [...data.solids, ...this.extras.flatMap((extra) => extra.solids || [])];
+    const clad = this.solid && !this.sticks ? new Set(data.solids.map((solid) => solid.of)) : new Set(); // bodies that are seen by their shapes
     const width = Math.min(3.5, Math.max(1, 3.5 * (20 / Math.max(data.bodies.length, 1)) ** 0.4));
     const styles = { ground: ["--faint", 0.5, [2, 4]], tie: ["--tie", 0.4, []], slide: ["--slide", 0.7, [5, 3]], bone: ["--bone", 1, []] };
     for (const [kind, [name, share, dashes]] of Object.entries(styles)) {
       if (kind === "ground" && !data.grounded) continue;
       const { of, at } = data.lines[kind];
       of.forEach((owners, i) => {
+        if (clad.has(owners[kind === "slide" || kind === "ground" ? 1 : 0])) return;
         const ends = owners.map((owner, j) => this.seen(placed(poses, owner, at[i][j])));
         const own = !colour && kind === "bone" && owners.includes(this.chosen) && owners[0] === this.chosen;
         items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || (own ? colourOf("--chosen") : (kind === "bone" && this.shadeOf(owners[0])) || colourOf(name)),
@@ -221,26 +310,33 @@ class Figure {
     }
     const size = data.tick;
     data.axes.of.forEach((owner, i) => {
+      if (clad.has(data.axes.hinge[i])) return;
       const p = placed(poses, owner, data.axes.at[i]), d = turned(poses, owner, data.axes.along[i]);
       const ends = [this.seen(along(p, -size, d)), this.seen(along(p, size, d))];
       items.push({ depth: (ends[0][2] + ends[1][2]) / 2, ends, stroke: colour || data.colours[data.axes.hinge[i]] || colourOf("--text"), width: 0.6 * width, dashes: [], body: -1 });
     });
     const joints = data.points.joint.of.map((owner, i) => this.seen(placed(poses, owner, data.points.joint.at[i])));
-    joints.forEach((at, i) => items.push({ depth: at[2], dot: at, fill: colour || this.shadeOf(i) || data.colours[i] || colourOf("--text"), body: i, radius: 1.7 * width }));
+    joints.forEach((at, i) => {
+      const beyond = !colour && this.beyond.has(i);
+      if (clad.has(i) && !beyond) return;
+      const fill = beyond ? colourOf("--beyond") : colour || this.shadeOf(i) || data.colours[i] || colourOf("--text");
+      items.push({ depth: at[2], dot: at, fill, body: i, radius: (beyond ? 2.6 : 1.7) * width });
+    });
     for (const [kind, share] of [["node", 0.9]]) {
       const { of, at } = data.points[kind];
       of.forEach((owner, i) => {
+        if (clad.has(owner)) return;
         const seen = this.seen(placed(poses, owner, at[i]));
         items.push({ depth: seen[2], dot: seen, fill: colour || colourOf("--tie"), body: owner, radius: share * width });
       });
     }
-    if (data.grounded) { // the base
+    if (data.grounded && !clad.size) { // the base
       const seen = this.seen([0, 0, 0]);
       items.push({ depth: seen[2], dot: seen, fill: colourOf("--faint"), body: -1, radius: 1.3 * width });
     }
     items.sort((a, b) => a.depth - b.depth);
     context.globalAlpha = alpha;
-    const faces = this.solid && data.solids.length ? this.faces(data, poses, colour) : [];
+    const faces = this.solid && solids.length ? this.faces(solids, poses, colour) : [];
     for (const face of faces) this.drawFace(face);
     if (!colour) this.drawn = faces;
     context.lineCap = "round";
@@ -251,9 +347,9 @@ class Figure {
   }
 
   // Triangles of the bodies' shapes as they are seen, from back to front, lit from where they are looked at.
-  faces(data, poses, colour) {
+  faces(solids, poses, colour) {
     const found = [];
-    for (const solid of data.solids) {
+    for (const solid of solids) {
       solid.read ??= { vertices: numbers(solid.vertices), faces: numbers(solid.faces) };
       const { vertices, faces } = solid.read, seen = [];
       for (let i = 0; i < vertices.length; i += 3) seen.push(this.seen(placed(poses, solid.of, vertices.subarray(i, i + 3))));
@@ -323,10 +419,35 @@ class Figure {
     context.fill();
   }
 
-  // The body whose hinge or line is nearest to a place in the picture, within 14 pixels, or whose shape is seen there; -1 for none.
-  bodyAt(x, y) {
-    let nearest = -1, least = 14;
-    for (const { ends, dot: at, body } of this.items || []) {
+  // What a user's code shows: { kind: "frame" | "label" | "line" | "shape", of, ... }, places in the frame of the body `of`, -1 the world's.
+  drawExtra({ kind, of, name, at, axes, size, points, text, colour }) {
+    const { context } = this, own = colour || colourOf("--text"), poses = this.poses;
+    const write = (words, place, fill) => {
+      const [x, y] = this.seen(place);
+      Object.assign(context, { fillStyle: fill, font: "12px system-ui, sans-serif", textAlign: "left" });
+      context.fillText(words, x + 6, y - 6);
+    };
+    if (kind === "line") this.drawLine(points.map((point) => placed(poses, of, point)), own, 2);
+    if (kind === "label") {
+      const [x, y] = this.seen(placed(poses, of, at));
+      context.beginPath();
+      context.arc(x, y, 3, 0, 2 * Math.PI);
+      context.fillStyle = own;
+      context.fill();
+      write(text, placed(poses, of, at), own);
+    }
+    if (kind === "frame") {
+      const origin = placed(poses, of, at);
+      axes.forEach((axis, i) => this.drawArrow({ at: origin, along: turned(poses, of, axis).map((x) => size * x), colour: colourOf(`--line${[1, 2, 0][i]}`) }));
+      write(name, origin, own);
+    }
+  }
+
+  // The body whose hinge or line is nearest to a place in the picture, within 14 pixels, or whose shape is seen there, and its depth there;
+  // body -1 for none.
+  hitAt(x, y) {
+    let nearest = { body: -1, depth: 0 }, least = 14;
+    for (const { ends, dot: at, body, depth } of this.items || []) {
       if (body < 0) continue;
       let distance;
       if (at) {
@@ -336,16 +457,26 @@ class Figure {
         const share = Math.max(0, Math.min(1, ((x - ends[0][0]) * u + (y - ends[0][1]) * v) / (u * u + v * v || 1)));
         distance = Math.hypot(ends[0][0] + share * u - x, ends[0][1] + share * v - y);
       }
-      if (distance < least) [nearest, least] = [body, distance];
+      if (distance < least) [nearest, least] = [{ body, depth }, distance];
     }
-    if (nearest >= 0) return nearest;
+    if (nearest.body >= 0) return nearest;
     const side = ([ax, ay], [bx, by]) => (bx - ax) * (y - ay) - (by - ay) * (x - ax);
     const hit = (this.drawn || []).findLast(({ points: [a, b, c] }) => {
       const sides = [side(a, b), side(b, c), side(c, a)];
       return sides.every((s) => s >= 0) || sides.every((s) => s <= 0);
     });
-    return hit ? hit.body : -1;
+    return hit ? { body: hit.body, depth: hit.depth / 3 } : nearest;
   }
+
+  bodyAt(x, y) {
+    return this.hitAt(x, y).body;
+  }
+}
+
+// A point in the world, in the frame of a body.
+function withinBody(poses, body, point) {
+  const X = poses.subarray(12 * body, 12 * body + 12), d = [3, 7, 11].map((i, j) => point[j] - X[i]);
+  return [0, 1, 2].map((j) => X[j] * d[0] + X[4 + j] * d[1] + X[8 + j] * d[2]);
 }
 
 // 1, 2 or 5 times a power of ten, at most the given length.

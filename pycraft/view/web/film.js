@@ -25,6 +25,7 @@ function frameAt(t) {
 function show(k) {
   frame = k;
   if (way) figure.way = Array.from({ length: k + 1 }, (_, i) => way.subarray(3 * i, 3 * i + 3));
+  figure.beyond = new Set(film.beyond.filter(({ spans }) => spans.some(([first, last]) => first <= k && k <= last)).map(({ body }) => body));
   figure.show(poses.subarray(width * k, width * (k + 1)));
   plots.forEach((plot) => plot.at(times[k]));
   byId("time").value = k;
@@ -58,7 +59,8 @@ byId("time").max = count - 1;
 byId("time").addEventListener("input", (event) => { stop(); show(+event.target.value); });
 byId("play").addEventListener("click", () => (playing ? stop() : start()));
 byId("speed").addEventListener("change", () => { since = 0; });
-byId("look").addEventListener("click", () => figure.look());
+if (film.follow) figure.follow = film.follow;
+cameraControls(figure, byId("camera"), film.figure.name);
 document.addEventListener("keydown", (event) => {
   if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName)) return;
   if (event.key === " ") playing ? stop() : start();

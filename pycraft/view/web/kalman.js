@@ -36,7 +36,7 @@ function drawTrack() {
   const [measured, predicted, smoothed, deviation] = [told.measured, told.predicted, told.smoothed, told.deviation].map((rows) => rows[seen]);
   const all = [...measured, ...smoothed, ...predicted.flatMap((z, t) => [z - 2 * (deviation[t] || 0), z + 2 * (deviation[t] || 0)])]
     .filter((x) => x !== null);
-  const [low, high] = [Math.min(...all), Math.max(...all)], [left, right, top, bottom] = [58, width - 14, 10, height - 24];
+  const [low, high] = [Math.min(...all), Math.max(...all)], [left, right, top, bottom] = [66, width - 14, 10, height - 36];
   const count = measured.length, x = (t) => left + ((t + 0.5) / count) * (right - left);
   const y = (value) => bottom - ((value - low) / (high - low || 1)) * (bottom - top);
   const step = niceStep((high - low || 1) / 4);
@@ -54,7 +54,13 @@ function drawTrack() {
   }
   context.textAlign = "center";
   const every = Math.max(1, Math.ceil(count / 12));
-  for (let t = 0; t < count; t += every) context.fillText(`t = ${t}`, x(t), height - 8);
+  for (let t = 0; t < count; t += every) context.fillText(`${t}`, x(t), height - 20);
+  context.fillText("time step t", (left + right) / 2, height - 5);
+  context.save();
+  context.translate(12, (top + bottom) / 2);
+  context.rotate(-Math.PI / 2);
+  context.fillText(told.measured.length > 1 ? `measurement y${seen + 1}(t)` : "measurement y(t)", 0, 0);
+  context.restore();
   const here = told.steps[now][1], found = known();
   context.fillStyle = colourOf("--panel");
   context.fillRect(x(here) - 0.5 * (x(1) - x(0)), top, x(1) - x(0), bottom - top);

@@ -34,6 +34,7 @@ function make(tag, parent, text = "", properties = {}) {
 function build() {
   byId("said").textContent = setup.effects.filter((effect) => effect.on).map((effect) => effect.name).join(", ") || "no effects";
   byId("loops").textContent = setup.loops.length ? `the rest follows on the loops: ${setup.loops.join(", ")}` : "";
+  figure.extras = setup.extras;
   figure.ghosts = setup.ghost ? [{ data: setup.ghost, poses: new Float32Array() }] : [];
   const ghost = byId("ghost");
   ghost.replaceChildren(new Option("none", ""), ...setup.ghosts.map((name) => new Option(name, name)));
@@ -72,6 +73,19 @@ function buildTree() {
   });
 }
 
+// -1 below its lower limit, 1 above its upper one, 0 within; what is at a limit but for rounding is within.
+function beyondLimit({ lower, upper }, u) {
+  const slack = (limit) => 1e-9 * Math.max(1, Math.abs(limit));
+  return lower !== null && u < lower - slack(lower) ? -1 : upper !== null && u > upper + slack(upper) ? 1 : 0;
+}
+
+function showLimits(u) {
+  const crossed = setup.coordinates.filter((coordinate, j) => beyondLimit(coordinate, u[j]));
+  figure.beyond = new Set(crossed.map((coordinate) => coordinate.body));
+  const more = crossed.length - 4, names = crossed.slice(0, 4).map((coordinate) => coordinate.name).join(", ");
+  byId("beyond").textContent = crossed.length ? `beyond limits: ${names}${more > 0 ? ` and ${more} more` : ""}` : "";
+}
+
 function buildSliders() {
   const all = setup.coordinates.map((coordinate, j) => ({ ...coordinate, j }));
   const shown = all.length <= SLIDERS ? all : all.filter((coordinate) => coordinate.body === picked);
@@ -79,11 +93,11 @@ function buildSliders() {
   if (shown.length < all.length) make("p", byId("sliders"), `${all.length} coordinates: those of the picked body`, { className: "faint" });
   for (const coordinate of shown) {
     const box = make("label", byId("sliders"), "", { className: "slider" });
-    const name = make("span", box, coordinate.name), [low, high] = [coordinate.low, coordinate.high].map((x) => +x.toPrecision(3));
-    make("small", name, coordinate.bounded ? ` ${low} … ${high}` : " no limits", { className: "faint" });
-    const value = make("output", box), range = make("input", box, "", {
-      type: "range", min: coordinate.low, max: coordinate.high, step: "any", id: `u${coordinate.j}`,
-    });
+    make("span", box, coordinate.name, { title: coordinate.name });
+    const value = make("output", box), ends = [coordinate.lower, coordinate.upper].map((x) => (x === null ? "" : `${+x.toPrecision(3)}`));
+    const below = make("small", box, ends[0], { title: coordinate.lower === null ? "no lower limit" : "lower limit" });
+    const range = make("input", box, "", { type: "range", min: coordinate.low, max: coordinate.high, step: "any", id: `u${coordinate.j}` });
+    const above = make("small", box, ends[1], { title: coordinate.upper === null ? "no upper limit" : "upper limit" });
     range.setAttribute("aria-label", `${coordinate.name}, ${coordinate.unit}, from ${coordinate.low} to ${coordinate.high}`);
     let wanted = null;
     range.addEventListener("input", async () => { // the last of many moves counts
@@ -99,6 +113,10 @@ function buildSliders() {
     coordinate.turns = 0; // whole turns of an angle without limits, which the slider leaves as they are
     coordinate.show = (u) => {
       value.textContent = `${u.toFixed(3)} ${coordinate.unit}`;
+      const side = beyondLimit(coordinate, u);
+      box.classList.toggle("beyond", side !== 0);
+      below.classList.toggle("crossed", side < 0);
+      above.classList.toggle("crossed", side > 0);
       if (wanted !== null) return;
       if (coordinate.unit === "rad" && !coordinate.bounded) coordinate.turns = 2 * Math.PI * Math.round(u / (2 * Math.PI));
       range.value = u - coordinate.turns;
@@ -121,11 +139,19 @@ function pick(k) {
   refresh();
 }
 
+// A number with so many figures in as few letters: 1.2e-5 and not 0.0000120.
+function short(x, figures) {
+  const plain = `${+x.toPrecision(figures)}`, power = x.toExponential(figures - 2).replace("e+", "e");
+  return plain.length > figures + 4 && power.length < plain.length ? power : plain;
+}
+
+const UNITS = { M: "kg m², kg m; kg m, kg", P: "kg m², kg m; kg m, kg", D: "of the hinge's coordinates: kg m² and kg" };
+
 function table(rows) {
   const made = document.createElement("table");
   for (const row of rows) {
     const line = make("tr", made);
-    for (const x of row) make("td", line, x === null ? "-" : `${+x.toPrecision(row.length > 4 ? 3 : 4)}`, { title: `${x}` });
+    for (const x of row) make("td", line, x === null ? "-" : short(x, row.length > 4 ? 3 : 4), { title: `${x}` });
   }
   return made;
 }
@@ -138,43 +164,63 @@ async function inspect() {
     const box = document.createElement("div");
     make("div", box, `${body.kind} ${body.hinge} on ${body.parent ?? "the base"}; ${body.mass} kg`);
     const parts = [["X_WB, m", body.pose], ["velocity (angular; linear), own axes, rad/s and m/s", [body.twist]], ["centre of mass, own axes, m", [body.com]],
-      ...["M", "P", "D"].map((letter) => [letter, body[letter]]), ...Object.entries(body.frames).map(([node, at]) => [`frame ${node}, m`, [at]])];
-    for (const [title, rows] of parts) if (rows && rows.length && rows[0].length) {
-      make("div", box, title, { className: "faint" });
+      ...["M", "P", "D"].map((letter) => [letter, body[letter], UNITS[letter]]), ...Object.entries(body.frames).map(([node, at]) => [`frame ${node}, m`, [at]])];
+    for (const [title, rows, units] of parts) if (rows && rows.length && rows[0].length) {
+      make("div", box, title, { className: "faint" }).append(...(units ? [` (${units})`] : []));
       box.append(table(rows));
     }
     byId("numbers").replaceChildren(box);
   }
   const letter = byId("letter").value;
+  byId("blocks").hidden = !letter;
   if (letter) drawBlocks(await ask(`/blocks?of=${encodeURIComponent(letter)}`));
 }
 
-// Blocks, darker by the logarithm of their largest entry; blue positive, orange negative.
-function drawBlocks({ rows, columns, values }) {
-  const canvas = byId("blocks"), context = canvas.getContext("2d"), ratio = devicePixelRatio || 1;
-  const side = Math.min(canvas.clientWidth, canvas.clientHeight);
-  [canvas.width, canvas.height] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+// Blocks, deeper by the logarithm of their largest entry; blue positive, orange negative. Names of rows and columns where they have room.
+function drawBlocks({ rows, columns, values, units }) {
+  const canvas = byId("blocks"), context = canvas.getContext("2d"), ratio = devicePixelRatio || 1, [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  const cell = side / Math.max(rows.length, columns.length, 1), sizes = values.flat().map(Math.abs), most = Math.max(...sizes, 1e-300);
+  context.font = "10px system-ui, sans-serif";
+  const cut = (name) => (name.length > 14 ? `${name.slice(0, 6)}…${name.slice(-7)}` : name);
+  const room = (names) => Math.min(86, 8 + Math.max(0, ...names.map((name) => context.measureText(cut(name)).width)));
+  const [left, top] = [room(rows), room(columns)], cell = Math.min((width - left) / Math.max(columns.length, 1), (height - top) / Math.max(rows.length, 1));
+  const sizes = values.flat().map(Math.abs), most = Math.max(...sizes, 1e-300), every = Math.max(1, Math.ceil(11 / cell));
+  context.fillStyle = colourOf("--text");
+  rows.forEach((name, i) => {
+    context.textAlign = "right";
+    if (i % every === 0) context.fillText(cut(name), left - 4, top + (i + 0.5) * cell + 3);
+  });
+  columns.forEach((name, j) => {
+    if (j % every) return;
+    context.save();
+    context.translate(left + (j + 0.5) * cell + 3, top - 4);
+    context.rotate(-Math.PI / 2);
+    context.textAlign = "left";
+    context.fillText(cut(name), 0, 0);
+    context.restore();
+  });
   values.forEach((row, i) => row.forEach((x, j) => {
-    const depth = x ? Math.max(0.12, 1 + Math.log10(Math.abs(x) / most) / 6) : 0;
+    const depth = x ? Math.max(0.12, 1 + Math.log10(Math.abs(x) / most) / 6) : 0, [u, v] = [left + j * cell, top + i * cell];
     context.globalAlpha = 1;
     context.fillStyle = colourOf("--panel");
-    context.fillRect(j * cell, i * cell, cell - 1, cell - 1);
+    context.fillRect(u, v, cell - 1, cell - 1);
     context.globalAlpha = depth;
     context.fillStyle = x > 0 ? colourOf("--line0") : colourOf("--line1");
-    context.fillRect(j * cell, i * cell, cell - 1, cell - 1);
+    context.fillRect(u, v, cell - 1, cell - 1);
     context.globalAlpha = 1;
-    if (cell < 42) return;
+    const text = short(x, cell < 46 ? 2 : 3);
+    if (context.measureText(text).width > cell - 4) return; // pointing at it tells it
     context.fillStyle = depth > 0.6 ? colourOf("--page") : colourOf("--text");
     context.textAlign = "center";
-    context.font = "11px system-ui, sans-serif";
-    context.fillText(`${+x.toPrecision(3)}`, (j + 0.5) * cell, (i + 0.5) * cell + 4);
+    context.fillText(text, u + 0.5 * cell, v + 0.5 * cell + 3);
   }));
   canvas.onpointermove = (event) => {
-    const [i, j] = [Math.floor(event.offsetY / cell), Math.floor(event.offsetX / cell)];
-    byId("block").textContent = i < rows.length && j < columns.length ? `${rows[i]}, ${columns[j]}: ${values[i][j]}` : "";
+    const [i, j] = [Math.floor((event.offsetY - top) / cell), Math.floor((event.offsetX - left) / cell)];
+    const inside = i >= 0 && j >= 0 && i < rows.length && j < columns.length;
+    byId("block").textContent = inside ? `${rows[i]}, ${columns[j]}: ${values[i][j]}` : `largest entry of each block${units ? `, ${units}` : ""}`;
   };
+  if (!byId("block").textContent) byId("block").textContent = `largest entry of each block${units ? `, ${units}` : ""}`;
 }
 
 // --- plots
@@ -199,15 +245,24 @@ function drawCharts() {
 
 // --- from moment to moment
 function arrows() {
-  const reach = Math.max(...setup.figure.half), units = { velocity: "m/s", force: "N" }, styles = { velocity: "--line2", force: "--line3" };
+  const reach = Math.max(...setup.figure.half), units = { velocity: "m/s", force: "N" };
   figure.arrows = [];
-  byId("longest").textContent = Object.entries(state.arrows).map(([kind, list]) => {
+  const said = byId("longest");
+  said.replaceChildren();
+  for (const [kind, list] of Object.entries(state.arrows)) {
     const now = Math.max(0, ...list.map(([, vector]) => Math.hypot(...vector)));
     longest[kind] = Math.max(longest[kind] || 0, now); // lengths are compared over time
     const share = longest[kind] ? (0.6 * reach) / longest[kind] : 0;
-    for (const [at, vector] of list) figure.arrows.push({ at, along: vector.map((x) => share * x), colour: colourOf(styles[kind]) });
-    return `longest ${kind}: ${+now.toPrecision(3)} ${units[kind]}`;
-  }).concat(state.missing, setup.figure.unshown).join("; ");
+    for (const [at, vector] of list) figure.arrows.push({ at, along: vector.map((x) => share * x), colour: colourOf(`--${kind}`) });
+    make("span", said, `→ longest ${kind}: ${+now.toPrecision(3)} ${units[kind]}`, { className: kind });
+  }
+  if (state.push) {
+    const size = Math.hypot(...state.push.force), share = state.push.most ? (0.6 * reach) / state.push.most : 0;
+    figure.arrows.push({ at: state.push.at, along: state.push.force.map((x) => share * x), colour: colourOf("--chosen") });
+    make("span", said, `→ push: ${+size.toPrecision(3)} N`);
+  }
+  if (setup.ghost) make("span", said, `▪ ghost: ${setup.ghost_name}`).style.color = "var(--ghost)";
+  said.append(state.missing.join("; "));
 }
 
 function show(now) {
@@ -217,6 +272,7 @@ function show(now) {
   else kept[kept.length - 1] = now;
   if (kept.length > KEPT) kept = kept.filter((_, i) => i % 2 === 0 || i > KEPT / 2); // the older half thins out
   arrows();
+  showLimits(now.u);
   figure.shade = now.shade;
   if (figure.ghosts.length && now.ghost) figure.ghosts[0].poses = numbers(now.ghost);
   figure.show(numbers(now.poses));
@@ -255,7 +311,35 @@ async function live() {
   setTimeout(live, document.hidden ? 1000 : state && state.playing ? 30 : 300);
 }
 
-figure = new Figure(byId("figure"), setup.figure, pick);
+// --- a body held by the pointer: pushed while the scene plays, or led by inverse kinematics
+const hands = {
+  kind: "", sent: null,
+  holding(event) {
+    this.kind = event.ctrlKey || event.metaKey ? "push" : event.altKey ? "lead" : byId("hand").value;
+    return this.kind !== "";
+  },
+  begin(body, place) {
+    pick(body);
+    if (this.kind === "push") act("push", { body: setup.figure.bodies[body], place, to: placed(figure.poses, body, place) });
+    if (this.kind === "push" && !state.playing) act("play");
+  },
+  async move(body, place, to) { // the last of many moves counts
+    const waits = this.sent !== null;
+    this.sent = { body: setup.figure.bodies[body], place, to };
+    if (waits) return;
+    while (this.sent !== null) {
+      const now = this.sent;
+      await act(this.kind, now);
+      if (this.sent === now) this.sent = null;
+    }
+  },
+  end() {
+    this.sent = null;
+    if (this.kind === "push") act("let_go");
+  },
+};
+
+figure = new Figure(byId("figure"), setup.figure, pick, hands);
 energies = new Plot(byId("charts"), { title: "energies", axis: "J", names: ["kinetic", "potential", "kinetic + potential - work"] });
 byId("letter").replaceChildren(new Option("none", ""), ...setup.letters.map((letter) => new Option(letter)));
 byId("letter").addEventListener("change", () => { looked = 0; refresh(); });
@@ -266,10 +350,8 @@ for (const action of ["step", "reset", "neutral", "random", "rest"]) byId(action
 byId("scale").addEventListener("change", (event) => act("scale", { to: +event.target.value }));
 byId("ghost").addEventListener("change", (event) => act("ghost", { name: event.target.value }));
 for (const kind of ["velocity", "force", "shade"]) byId(kind).addEventListener("change", refresh);
-byId("solid").addEventListener("change", (event) => { figure.solid = event.target.checked; figure.draw(); });
-byId("solids").hidden = !setup.figure.solids.length;
-byId("said").title = setup.figure.unshown.join("; ");
-byId("look").addEventListener("click", () => figure.look());
+byId("hand").addEventListener("change", (event) => { byId("figure").style.cursor = event.target.value ? "crosshair" : ""; });
+cameraControls(figure, byId("camera"), setup.figure.name);
 build();
 buildTree();
 buildSliders();

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import monotonic
 from types import TracebackType
 from typing import Any
 
 SECONDS = 1.0
 """What takes no longer shows nothing."""
+WIDEST = 40
+"""Letters of a step's name."""
 
 
 class ProgressBar:
@@ -45,6 +48,9 @@ class ProgressBar:
         self._wanted = console.is_terminal or console.is_jupyter
         if not self._wanted:
             return
+        if console.is_jupyter:
+            self._bar = _NotebookLine(self._total)
+            return
         columns = [TextColumn("{task.fields[at]}"), BarColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn()]
         self._bar = Progress(*columns, console=console, transient=True)
         self._task = self._bar.add_task("", total=self._total, at="", rate="")
@@ -53,6 +59,46 @@ class ProgressBar:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None) -> None:
         if self._bar is not None:
             self._bar.stop()
+
+
+class StepProgress(ProgressBar):
+    """Of named steps, such as theorems or meshes: call it with the name of each before it begins.
+
+    Parameters
+    ----------
+    total : how many steps there are
+    unit : what they are, "theorems"
+    progress : True or None: the bar; False: nothing; a function: it is called with each name instead
+    """
+
+    def __init__(self, total: int, unit: str, progress: Callable[[str], None] | bool | None = True):
+        super().__init__(total, progress is not False and not callable(progress))
+        self._call = progress if callable(progress) else None
+        self._unit, self._done = unit, 0
+
+    def __call__(self, name: str) -> None:
+        """This step begins; those before it are done."""
+        if self._call is not None:
+            self._call(name)
+        self.show(self._done, f"{self._done} of {self._total} {self._unit}: {name[:WIDEST]}", f"{self._unit}/s")
+        self._done += 1
+
+
+class _NotebookLine:
+    """A line of text in a notebook's cell, which is replaced as the work goes on and is empty when it ends."""
+
+    def __init__(self, total: float):
+        from IPython.display import display
+
+        self._total = total
+        self._shown = display({"text/plain": ""}, raw=True, display_id=True)
+
+    def update(self, _: Any, completed: float, rate: str, at: str) -> None:
+        share = 100 * completed / self._total if self._total else 100.0
+        self._shown.update({"text/plain": f"{at} ({share:.0f} %, {rate})"}, raw=True)
+
+    def stop(self) -> None:
+        self._shown.update({"text/plain": ""}, raw=True)
 
 
 class RunProgress(ProgressBar):
