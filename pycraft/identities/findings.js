@@ -25,6 +25,7 @@ for (const root of document.querySelectorAll(".pycraft-report:not([data-ready])"
     };
   }
   field.oninput = show;
-  root.querySelector(".controls").hidden = false;
+  const controls = root.querySelector(".controls");
+  [controls.hidden, controls.style.display] = [false, ""];
   show();
 }

@@ -69,9 +69,10 @@ def report_html(report: Any) -> str:
     summary = escape(report.summary()).replace("\n", "<br>")
     return (
         f'<div class="pycraft-report"><style>{_text("css")}</style><p><b>{summary}</b></p>'
-        f'<div class="controls" hidden>{buttons}<input type="search" placeholder="words or letters" aria-label="words or letters">'
-        f'<span class="count" role="status"></span></div>'
-        f'<div class="rows"><table style="table-layout:auto;width:100%">{head}{"".join(rows)}</table></div>'
+        f'<div class="controls" hidden style="display:none">{buttons}'
+        f'<input type="search" placeholder="words or letters" aria-label="words or letters"><span class="count" role="status"></span></div>'
+        f'<div class="rows" style="max-height:460px;overflow:auto">'
+        f'<table style="table-layout:auto;width:100%">{head}{"".join(rows)}</table></div>'
         f"<script>{_text('js')}</script></div>"
     )
 

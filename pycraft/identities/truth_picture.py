@@ -102,7 +102,7 @@ def _grid(found: Any) -> tuple[list[tuple[str, str, str]], list[str], dict[Any, 
 def _cell(cell: Any) -> str:
     told = f'title="{escape(cell.word)}; {cell.models} model{"s" * (cell.models != 1)} tried"'
     drawn = "" if cell.example is None else _case_svg(cell.example, cell.word)
-    return f"<div {told}>{verdict_html(cell.verdict)}{drawn}</div>"
+    return f"<div {told}>{verdict_html(cell.verdict)} {drawn}</div>"  # a notebook that is not trusted shows the drawing's words
 
 
 def _case_svg(case: Any, words: str) -> str:

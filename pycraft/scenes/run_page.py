@@ -76,8 +76,7 @@ class RunPage(Page):
 
     def _follow(self, figure: dict[str, Any]) -> str:
         """What the camera follows at first: a model that is loose and goes far beyond its own size; else nothing."""
-        loose = any(kind == "free" for kind in self._skeleton.kinds)
-        return "robot" if loose and max(figure["half"]) > FAR * max(figure["near"]) else ""
+        return "robot" if self._skeleton.is_loose() and max(figure["half"]) > FAR * max(figure["near"]) else ""
 
     def _beyond(self) -> list[dict[str, Any]]:
         """Of each coordinate beyond a limit that no effect holds: its body, and the first and last frame of each time that it is."""

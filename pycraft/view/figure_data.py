@@ -87,14 +87,15 @@ def _corners(vertices: np.ndarray) -> np.ndarray:
 def _box(skeleton: Skeleton, q: np.ndarray, grounded: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> dict[str, Any]:
     poses = skeleton.poses(q)
     shown = _shown_points(skeleton, poses, grounded, solid)
-    first = shown if q.ndim == 1 else _shown_points(skeleton, poses.reshape(-1, *poses.shape[-3:])[0], grounded, solid)
+    loose = skeleton.is_loose()  # then the base is not part of what is seen of the first state
+    first = _shown_points(skeleton, poses.reshape(-1, *poses.shape[-3:])[0], grounded and not loose, solid)
     low, high, half = _extent_of(shown)
     reach = float((high - low).max()) or 1.0
     bones = np.linalg.norm(np.diff(placed(poses, *skeleton.lines["bone"]), axis=-2), axis=-1)
     typical = float(np.median(bones[bones > 1e-9 * reach])) if np.any(bones > 1e-9 * reach) else reach
     return {
         "centre": _rounded((low + high) / 2), "half": _rounded(half), "near": _rounded(_extent_of(first)[2]),
-        "floor": float(f"{_floor(first, low, grounded, up, solid):.7g}"), "tick": float(f"{min(0.045 * reach, 0.4 * typical):.7g}"),
+        "floor": float(f"{_floor(first, low, loose, up, solid):.7g}"), "tick": float(f"{min(0.045 * reach, 0.4 * typical):.7g}"),
     }  # fmt: skip
 
 
@@ -114,10 +115,10 @@ def _extent_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return low, high, np.maximum((high - low) / 2, _THIN * reach) + 0.06 * reach
 
 
-def _floor(first: np.ndarray, low: np.ndarray, grounded: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> float:
+def _floor(first: np.ndarray, low: np.ndarray, loose: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> float:
     """The height of the floor: under the base of what stands, under the first state of what is loose, else under all that is seen."""
     lowest = float(first[:, up].min(initial=np.inf))
-    if not grounded:
+    if loose:
         return lowest if np.isfinite(lowest) else float(low[up])
     base = min([0.0, *(float(vertices[:, up].min()) for of, vertices in solid if of < 0)])
     reach = float(np.ptp(first, axis=0).max()) if len(first) else 0.0

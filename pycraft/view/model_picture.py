@@ -51,10 +51,10 @@ def _figure(model: Any, bodies: list[dict[str, Any]]) -> str:
         for a, b in at.bones
     ]
     x, y = at.base
-    parts.append(f"<rect x='{x - 5:.1f}' y='{y - 5:.1f}' width='10' height='10' fill='currentColor'><title>base</title></rect>")
+    parts.append(f"<rect x='{x - 5:.1f}' y='{y - 5:.1f}' width='10' height='10' fill='currentColor'><title>base </title></rect>")
     size = _SIZE if len(bodies) < 60 else 3.0
     for (x, y), body in zip(at.bodies, bodies, strict=True):
-        title = f"{body['name']}, on {body['hinge']['kind']} {body['hinge']['name']}"
+        title = f"{body['name']}, on {body['hinge']['kind']} {body['hinge']['name']} "  # words apart where drawings are taken out
         parts.append(_mark(body["hinge"]["kind"], x, y, size, title))
     kinds = Counter(body["hinge"]["kind"] for body in bodies)
     for i, (kind, count) in enumerate(kinds.items()):

@@ -124,6 +124,11 @@ class Skeleton:
         """Triangles of the model's shapes, and why others are not shown: see `solids`."""
         return solids(self.model)
 
+    def is_loose(self) -> bool:
+        """Whether nothing holds the model: every body on the base is on a free hinge."""
+        roots = [kind for kind, body in zip(self.kinds, self.model.description()["bodies"], strict=True) if body["parent"] < 0]
+        return bool(roots) and all(kind == "free" for kind in roots)
+
     def is_grounded(self) -> bool:
         """Whether the base is shown at its origin: unless that lies far off what it carries."""
         poses = self.poses(self.model.zero_q())

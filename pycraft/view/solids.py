@@ -15,8 +15,8 @@ from ..progress_bar import StepProgress
 
 ROUND = 16
 """Sides of what is round."""
-MOST = 6000
-"""Triangles of a figure: a canvas without a graphics card draws and sorts so many some twenty times a second."""
+MOST = 10000
+"""Triangles of a figure: a canvas without a graphics card sorts and draws so many some twenty times a second."""
 
 
 def solids(model: Any, most: int | None = MOST) -> tuple[list[dict[str, Any]], list[str]]:

@@ -39,6 +39,6 @@ for (const root of document.querySelectorAll(".pycraft-sweeps:not([data-ready])"
   slider.oninput = () => { stop(); show(Number(slider.value)); };
   find("back").onclick = () => { stop(); show(Math.max(0, Number(slider.value) - 1)); };
   find("next").onclick = () => { stop(); show(Math.min(film.steps.length - 1, Number(slider.value) + 1)); };
-  find("controls").hidden = false;
+  [find("controls").hidden, find("controls").style.display] = [false, ""];
   show(film.steps.length - 1);
 }

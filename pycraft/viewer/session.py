@@ -64,7 +64,7 @@ class Session:
         """What does not change from moment to moment: the figure, the coordinates, effects with their parameters, letters."""
         with self.lock:
             live, model = self.live, self.live.model
-            states = np.array([model.zero_q(), live.q, *(model.random_state(seed).q for seed in range(SEEN_STATES))])
+            states = np.array([live.q, model.zero_q(), *self._random_states()])
             ghost = self.ghost
             other = None if ghost is None else figure_data(ghost.skeleton, np.array([ghost.q]))
             names = list(live.scene.effects)
@@ -76,6 +76,16 @@ class Session:
                 "ghost_name": self.ghost_name, "extras": self.extras.shown(live.skeleton),
                 "letters": list(LETTERS), "loops": list(model.loops),
             }  # fmt: skip
+
+    def _random_states(self) -> list[np.ndarray]:
+        """Configurations that the first look has in view; of what is loose where it is now, and not all over the place."""
+        live, model = self.live, self.live.model
+        drawn = [np.array(model.random_state(seed).q) for seed in range(SEEN_STATES)]
+        roots = [hinge.q_slice for hinge in model.hinges.values() if hinge.kind == "free"]
+        for q in drawn:
+            for root in roots:
+                q[root] = live.q[root]
+        return drawn
 
     def _coordinates(self) -> list[dict[str, Any]]:
         model = self.live.model

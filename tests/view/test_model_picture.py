@@ -14,7 +14,7 @@ from pycraft.view.stick_figure import HINGES
 
 def marks(page):
     """Titles of the figure's marks of hinges, legend left out."""
-    return [title for title in re.findall(r"<title>([^<]*)</title>", page) if ", on " in title]
+    return [title.strip() for title in re.findall(r"<title>([^<]*)</title>", page) if ", on " in title]
 
 
 def test_every_kind_of_hinge_has_a_mark_of_its_own():

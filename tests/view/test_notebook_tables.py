@@ -73,3 +73,11 @@ def test_columns_have_names_of_their_own():
     row = {"left out": ["gravity"], "together": False, "saved": -0.5, "saved of run": -8.38}
     table = ComparisonTable("", [row], {"own_error": 0.0, "noise": 0.01})
     assert table.cell("saved of run", row) == "takes 9.4 ×" and table.cell("saved", row) == "-50 %"
+
+
+def test_what_is_not_trusted_scrolls_and_has_no_buttons(browser, report, tmp_path):
+    """Buttons without their script do nothing, and a hundred rows are no page."""
+    with opened(browser, page_of(tmp_path, report, trusted=False), size=(800, 900)) as page:
+        assert not page.is_visible(".controls") and page.locator(".rows").bounding_box()["height"] <= 460
+    with opened(browser, page_of(tmp_path, report), size=(800, 900)) as page:
+        assert page.is_visible(".controls") and page.evaluate("getComputedStyle(document.querySelector('.controls')).display") == "flex"

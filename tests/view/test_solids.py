@@ -236,3 +236,31 @@ def test_pages_of_runs_have_them(model):
     page = pc.Scene(model).simulate(0.1).to_html()
     data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
     assert [solid["of"] for solid in data["figure"]["solids"]][:3] == [-1, 0, 1]
+
+
+def test_the_floor_is_under_the_base():
+    """Of what stands on its base at the base's lowest point, of what hangs below it under all, of what is loose under where it begins."""
+    arm = pc.robots.panda()
+    stands = np.array([0, 0.3, 0, -1.5, 0, 1.8, 0])
+    data = figure_data(Skeleton(arm), np.array([stands, *(arm.random_state(seed).q for seed in range(4))]))
+    base = min(solid["vertices"][:, 2].min() for solid in solids(arm)[0] if solid["of"] < 0)
+    assert data["floor"] == pytest.approx(min(base, 0.0), abs=1e-6)
+    pendulum = pc.mechanisms.double_pendulum().model
+    hanging = figure_data(Skeleton(pendulum), np.array([[np.pi / 2, 0.0]]))
+    assert hanging["floor"] <= -2.0 + 1e-6  # two rods of a metre
+    dog = pc.robots.a1()
+    q, risen = dog.clamped(dog.neutral()), dog.clamped(dog.neutral())
+    risen[list(dog.hinges.values())[0].q_slice.stop - 1] += 1.0  # of a free hinge the position comes last
+    low, high = (figure_data(Skeleton(dog), np.array([first, q]))["floor"] for first in (q, risen))
+    assert high == pytest.approx(low + 1.0, abs=1e-6) and Skeleton(dog).is_loose() and not Skeleton(arm).is_loose()
+
+
+def test_a_loose_robot_fills_the_first_look():
+    """Random states put it metres away: they have its joints alone."""
+    from pycraft.viewer.session import Session
+
+    dog = pc.robots.a1()
+    session = Session(pc.Scene(dog))
+    figure = session.setup()["figure"]
+    session.close()
+    assert max(figure["half"]) < 3 * max(figure["near"])  # legs swing

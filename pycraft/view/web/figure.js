@@ -32,6 +32,8 @@ function turned(poses, owner, d) {
 
 // Directions that the figure is seen from: yaw and pitch, rad.
 const VIEWS = { "from above": [0.6, 0.35], "side": [0, 0], "front": [Math.PI / 2, 0], "back": [-Math.PI / 2, 0], "top": [0, Math.PI / 2] };
+const TINTS = 64; // of a colour by the light
+const SEAM = 0.7; // pixels that triangles reach over their edges
 const NEAREST = 400, FARTHEST = 0.02; // of the zoom, 1 at first
 
 class Figure {
@@ -179,7 +181,7 @@ class Figure {
     }
     const half = this.follow === "" ? data.half : data.near; // what is followed fills the picture, not its way
     const span = (axis) => 2 * axis.reduce((sum, x, i) => sum + Math.abs(x) * half[i], 0);
-    const axes = this.basis();
+    const axes = (this.axes = this.basis());
     this.scale = this.zoom * 0.9 * Math.min(width / span(axes[0]), height / span(axes[1]));
     this.seen = (p) => {
       const d = along(p, -1, this.centre);
@@ -346,37 +348,57 @@ class Figure {
     if (!colour) this.items = items;
   }
 
-  // Triangles of the bodies' shapes as they are seen, from back to front, lit from where they are looked at.
+  // Triangles of the bodies' shapes as they are seen, from back to front, lit from where they are looked at: { depth, points, body, fill },
+  // points the three places in the picture one after the other, depth three times their average.
   faces(solids, poses, colour) {
-    const found = [];
+    const found = [], { axes, scale, centre } = this, [left, top] = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
     for (const solid of solids) {
       solid.read ??= { vertices: numbers(solid.vertices), faces: numbers(solid.faces) };
-      const { vertices, faces } = solid.read, seen = [];
-      for (let i = 0; i < vertices.length; i += 3) seen.push(this.seen(placed(poses, solid.of, vertices.subarray(i, i + 3))));
-      const own = colour || (solid.of === this.chosen && solid.of >= 0 ? colourOf("--chosen") : this.shadeOf(solid.of)) || solid.colour || colourOf("--solid");
-      const parts = (own.match(/^#/) ? [1, 3, 5].map((i) => parseInt(own.slice(i, i + 2), 16)) : own.match(/[\d.]+/g).map(Number)).slice(0, 3);
+      const { vertices, faces } = solid.read, X = solid.of < 0 ? null : poses.subarray(12 * solid.of, 12 * solid.of + 12);
+      const rows = axes.map((e) => (X ? [0, 1, 2].map((j) => e[0] * X[j] + e[1] * X[4 + j] + e[2] * X[8 + j]) : e)); // of the body's axes
+      const [u0, v0, w0] = axes.map((e) => dot(e, along(X ? [X[3], X[7], X[11]] : [0, 0, 0], -1, centre)));
+      const seen = (solid.seen ??= new Float64Array(vertices.length)), [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2]] = rows;
+      for (let i = 0; i < vertices.length; i += 3) {
+        const [x, y, z] = [vertices[i], vertices[i + 1], vertices[i + 2]];
+        seen[i] = left + scale * (a0 * x + a1 * y + a2 * z + u0);
+        seen[i + 1] = top - scale * (b0 * x + b1 * y + b2 * z + v0);
+        seen[i + 2] = c0 * x + c1 * y + c2 * z + w0;
+      }
+      const tints = this.tintsOf(solid, colour);
       for (let i = 0; i < faces.length; i += 3) {
-        const points = [seen[faces[i]], seen[faces[i + 1]], seen[faces[i + 2]]];
-        const [a, b, c] = points, [u, v] = [along(b, -1, a), along(c, -1, a)].map(([x, y, z]) => [x, y, z * this.scale]);
-        const normal = cross(u, v), size = Math.hypot(...normal);
+        const [a, b, c] = [3 * faces[i], 3 * faces[i + 1], 3 * faces[i + 2]], [ax, ay, az] = [seen[a], seen[a + 1], seen[a + 2]];
+        const [ux, uy, uz] = [seen[b] - ax, seen[b + 1] - ay, (seen[b + 2] - az) * scale], [vx, vy, vz] = [seen[c] - ax, seen[c + 1] - ay, (seen[c + 2] - az) * scale];
+        const [nx, ny, nz] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], size = Math.sqrt(nx * nx + ny * ny + nz * nz);
         if (!(size > 1e-9)) continue;
-        const light = 0.45 + 0.55 * Math.abs(normal[2]) / size; // of both sides: meshes do not all say which is out
-        found.push({ depth: a[2] + b[2] + c[2], points, body: solid.of, fill: `rgb(${parts.map((x) => Math.round(light * x)).join(", ")})` });
+        const fill = tints[Math.round((TINTS - 1) * (Math.abs(nz) / size))]; // of both sides: meshes do not all say which is out
+        found.push({ depth: az + seen[b + 2] + seen[c + 2], points: [ax, ay, seen[b], seen[b + 1], seen[c], seen[c + 1]], body: solid.of, fill });
       }
     }
-    return found.sort((a, b) => a.depth - b.depth);
+    return found.sort((one, other) => one.depth - other.depth);
   }
 
-  drawFace({ points, fill }) {
-    const { context } = this;
-    context.setLineDash([]);
+  // A solid's colour from seen edgewise to seen from the front.
+  tintsOf(solid, colour) {
+    const own = colour || (solid.of === this.chosen && solid.of >= 0 ? colourOf("--chosen") : this.shadeOf(solid.of)) || solid.colour || colourOf("--solid");
+    if (solid.tints?.own === own) return solid.tints;
+    const parts = (own.match(/^#/) ? [1, 3, 5].map((i) => parseInt(own.slice(i, i + 2), 16)) : own.match(/[\d.]+/g).map(Number)).slice(0, 3);
+    solid.tints = Array.from({ length: TINTS }, (_, i) => `rgb(${parts.map((x) => Math.round((0.45 + 0.55 * (i / (TINTS - 1))) * x)).join(", ")})`);
+    solid.tints.own = own;
+    return solid.tints;
+  }
+
+  drawFace({ points: [ax, ay, bx, by, cx, cy], fill }) {
+    const { context } = this, [mx, my] = [(ax + bx + cx) / 3, (ay + by + cy) / 3];
+    const out = (x, y) => { // a little farther from the middle: no light between neighbours
+      const more = 1 + SEAM / (Math.abs(x - mx) + Math.abs(y - my) + SEAM);
+      context.lineTo(mx + more * (x - mx), my + more * (y - my));
+    };
     context.beginPath();
-    for (const [x, y] of points) context.lineTo(x, y);
-    context.closePath();
-    context.fillStyle = context.strokeStyle = fill;
-    context.lineWidth = 0.7; // no light between neighbours
+    out(ax, ay);
+    out(bx, by);
+    out(cx, cy);
+    context.fillStyle = fill;
     context.fill();
-    context.stroke();
   }
 
   drawItem({ ends, dot: at, stroke, fill, width, dashes, radius, body }) {
@@ -460,9 +482,9 @@ class Figure {
       if (distance < least) [nearest, least] = [{ body, depth }, distance];
     }
     if (nearest.body >= 0) return nearest;
-    const side = ([ax, ay], [bx, by]) => (bx - ax) * (y - ay) - (by - ay) * (x - ax);
-    const hit = (this.drawn || []).findLast(({ points: [a, b, c] }) => {
-      const sides = [side(a, b), side(b, c), side(c, a)];
+    const side = (ax, ay, bx, by) => (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+    const hit = (this.drawn || []).findLast(({ points: [ax, ay, bx, by, cx, cy] }) => {
+      const sides = [side(ax, ay, bx, by), side(bx, by, cx, cy), side(cx, cy, ax, ay)];
       return sides.every((s) => s >= 0) || sides.every((s) => s <= 0);
     });
     return hit ? { body: hit.body, depth: hit.depth / 3 } : nearest;
