@@ -78,7 +78,7 @@ def report_html(report: Any) -> str:
 
 
 def statement_html(report: Any) -> str:
-    """A `CheckReport`: the verdict, with a sign of its own where hypotheses make it true on random trees, the statement, and what is said below it."""
+    """A `CheckReport`: verdict, statement and what is said below; on random trees, what hypotheses make true has its own sign."""
     from .truth import in_words
 
     details = "".join(f'<div style="white-space:pre-wrap">{escape(line.strip())}</div>' for line in report.details())
