@@ -25,6 +25,8 @@ from .values import LARGEST, NoValue, transferred
 from .walk import GaveUp
 from .words import ONE, Alphabet, Polynomial, Word, combine, number, ratio, split
 
+LIKELY = 1.5
+"""Slips up to this cost are told of a line that does not fit: a star, a tilde, a sign, the order, a letter written for one near it."""
 SLIPS = 2.0
 """CPU seconds for the slip of a line that does not fit."""
 ACCEPTED = ("right", "another road")
@@ -140,7 +142,7 @@ class Exercise(WithGaps):
         except ParseError:
             return ""
         near, *_ = nearest(formula, small_models(), Budget(SLIPS))
-        return next((slip.words for new, slip in near if new[1] == formula[1]), "")
+        return next((slip.words for new, slip in near if new[1] == formula[1] and slip.cost <= LIKELY), "")
 
     def _misfit(self, line: Any) -> str | None:
         """What is said of a line between other spaces than the theorem's."""

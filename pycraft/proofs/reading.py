@@ -60,11 +60,13 @@ class Reading:
             self.extra[letter_name(name)] = what
 
     def _add(self, made: Sequence[Definition]) -> None:
-        self.definitions += made
-        self.unknown |= {d.name for d in made if is_map(d)}
         for d in made:
-            if not d.of_the_book:  # what does not read is said, whether it is used or not
-                self._statements().letter(d.name, self.definitions)
+            self.definitions.append(d)
+            value = None if d.of_the_book else self._statements().letter(d.name, self.definitions)  # what does not read is said at once
+            if is_map(d):  # one operator, in the statement and in what is assumed
+                self.extra[d.name] = value
+                self.definitions.pop()
+                self.unknown.add(d.name)
 
     def _statements(self, more: Mapping[str, Any] | None = None) -> Statements:
         return Statements(self.operators, {**(more or {}), **self.extra}, derive=along if self.written_out else _formula)
