@@ -12,7 +12,7 @@
 #   make test-clang             the C++ tests built by Clang (needs clang++: apt install clang, or CLANG=/path/to/clang++)
 #   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
 #   make mutants                small wrong changes, which the tests must notice; writes tests/mutation.md (under an hour)
-#   make campaigns              refinement against 5000 models made to break it (ten minutes of one core)
+#   make campaigns              refinement against 5000 models made to break it, expressions of all letters against NumPy (half an hour of one core)
 #   make stability              the catalogue of hard cases in full, beside the peers; writes tests/accuracy/stability.md
 PYTHON ?= python3
 MODEL ?=
@@ -101,6 +101,7 @@ stability: .venv/peers
 
 campaigns: .venv/tested
 	$(BIN)/python tests/campaigns/refinement.py --seeds 5000 --jobs $(JOBS) --verbose
+	$(BIN)/python tests/campaigns/expressions.py --seeds 1000 --jobs $(JOBS)
 
 lint: .venv/tested
 	$(BIN)/ruff check pycraft tests cpp docs/making docs/gallery

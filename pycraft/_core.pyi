@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'EmbeddedOperators', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'fluid_drag_effect', 'forms', 'gravity_compensation_effect', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_curvature', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'EmbeddedOperators', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'fluid_drag_effect', 'forms', 'gravity_compensation_effect', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'retired_integrator', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_curvature', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -639,7 +639,8 @@ class Scalar:
         """
     def gradient(self, over: str = 'coordinates') -> typing.Any:
         """
-        All derivatives at once, as an array: over "coordinates" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and
+        All derivatives at once, as an array: over "coordinates" (nv,), or (B, nv) where a batch is bound; where loops are embedded along the
+        independent coordinates, zero where nothing moves. Of ln det(HφMφ*H* [+ J]) and
         ln det D in three sweeps, O(N), and then also over "inertias", "geometry", "axes" (see
         Multibody.log_determinant_gradient); of any other scalar one derivative after the other, O(N) each.
         """
@@ -1154,7 +1155,7 @@ class Integration:
         ...
     def configuration_rate(self, q: typing.Any, v: typing.Any, precision: str | int, out: typing.Any) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any, foreign: typing.Any = None, right_hand_side: typing.Any = None) -> dict:
+    def trajectory(self, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], tau: typing.Any, damping: typing.Any, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, precision: str | int, form: str, refine: typing.Any, foreign: typing.Any = None, right_hand_side: typing.Any = None, stiff: typing.Any = None) -> dict:
         ...
 class FunctionOfTime:
     """
@@ -1361,6 +1362,16 @@ class RunRecord:
         """
         The ends of steps.
         """
+    @property
+    def stiffness(self) -> typing.Any:
+        """
+        What holds the steps of an explicit method, None: nothing.
+        """
+    @property
+    def switches(self) -> list[tuple[float, int]]:
+        """
+        From when on which of several methods took the steps.
+        """
 class InterbodyForces:
     """
     Forces of hinges on the bodies that they move, with wrenches on nodes of these names.
@@ -1465,6 +1476,10 @@ def _loop_operators_again(arg0: typing.Any) -> typing.Any:
     """
 def _make(arg0: str, arg1: collections.abc.Sequence[Operator], arg2: float | fractions.Fraction) -> Operator:
     ...
+def _moved(operands: collections.abc.Sequence[Operator]) -> SkoSource:
+    """
+    Whose coordinates diff() is along: embedded loops or a multibody model; None where nothing moves.
+    """
 def _parted(mass: tuple, name: str, pose: tuple, welded: tuple, welded_name: str) -> tuple:
     """
     The first body's mass properties without those of the one welded to it.
@@ -1664,9 +1679,13 @@ def residual(a: typing.Any, b: typing.Any, vectors: collections.abc.Mapping[str,
     """
     Largest entries of a - b, a and b: both evaluated as typed, no theorem used, the difference taken at the bound precision.
     """
+def retired_integrator(name: str) -> str:
+    """
+    What to take in place of an integrator that there was once; empty: there was none of that name.
+    """
 def rotor_inertia_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, inertia: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], gear_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> Effect:
     ...
-def run_scene(calls: SceneCalls, record: RunRecord, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, events: list, progress: typing.Any, checkpoint: typing.Any, foreign: typing.Any) -> None:
+def run_scene(calls: SceneCalls, record: RunRecord, q: typing.Any, v: typing.Any, times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], own: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool, events: list, progress: typing.Any, checkpoint: typing.Any, foreign: typing.Any, stiff: typing.Any = None) -> None:
     ...
 def run_scenes(calls: collections.abc.Sequence[SceneCalls], records: collections.abc.Sequence[RunRecord], q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], energy: bool, integrator: str, rtol: typing.SupportsFloat | typing.SupportsIndex, atol: typing.SupportsFloat | typing.SupportsIndex, step: typing.SupportsFloat | typing.SupportsIndex, max_step: typing.SupportsFloat | typing.SupportsIndex, normalise: bool) -> None:
     """

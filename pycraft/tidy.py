@@ -102,6 +102,11 @@ class TidyTable:
         """Signs of `legend` for what the last column of the table says in words, where a terminal is too narrow for these."""
         return ""
 
+    @property
+    def note(self) -> str:
+        """A sentence below the displayed table."""
+        return ""
+
     def table(self, width: int | None = None) -> Any:
         """The rows as a rich table for a terminal of this width (the present one's where left out): no number and no word is cut.
 
@@ -129,7 +134,13 @@ class TidyTable:
                 del titles[self.common]
         own = _widths(titles.values(), cells)
         own[0] = max(12, min(own[0], width - sum(own[1:]) - len(own) + 1))
-        table = Table(title=plain(self.title), caption="; ".join(legend) or None, box=None, pad_edge=False, header_style="bold")
+        table = Table(
+            title=plain(self.title),
+            caption="\n".join(filter(None, ["; ".join(legend), plain(self.note)])) or None,
+            box=None,
+            pad_edge=False,
+            header_style="bold",
+        )
         table.title_justify = table.caption_justify = "left"
         table.padding = (0, 1, 0, 0)
         table.min_width = min(width, cell_len(self.title))
@@ -163,8 +174,9 @@ class TidyTable:
             + "</tr>"
             for row in self.rows
         )
+        note = f"<p>{escape(self.note)}</p>" if self.note else ""
         table = f"<table style='font-size:85%;table-layout:auto'><tr>{head}</tr>{body}</table>"
-        return f"<p><b>{escape(self.title)}</b></p><div style='overflow-x:auto'>{table}</div>"
+        return f"<p><b>{escape(self.title)}</b></p><div style='overflow-x:auto'>{table}</div>{note}"
 
 
 def terminal_width() -> int:

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "bindings/users_function.h"
+#include "model/checks.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -54,7 +56,9 @@ class BoundPythonEffect : public BoundEffect<S> {
     for (int i = 0; i < calls_.states; ++i) own_[i] = to_double(at.own[i]);
     const py::gil_scoped_acquire gil;
     const auto q = copied(q_.data(), calls_.nq), v = copied(v_.data(), calls_.nv);
-    const py::object result = own ? (*call)(to_double(at.t), q, v, copied(own_.data(), calls_.states)) : (*call)(to_double(at.t), q, v);
+    const py::object result = of_user("the " + std::string(what) + " function of effect '" + kind_ + "' at t = " + short_number(to_double(at.t)) + " s", [&] {
+      return own ? (*call)(to_double(at.t), q, v, copied(own_.data(), calls_.states)) : (*call)(to_double(at.t), q, v);
+    });
     take(result, n, given_.data(), "effect '" + kind_ + "': its " + what + " function");
   }
   PythonEffect::Calls calls_;
@@ -76,7 +80,7 @@ std::shared_ptr<py::object> held_object(const py::object& object) {
 void PythonFunctionOfTime::at(double t, double* value, double* rate, double* second) const {
   const py::gil_scoped_acquire gil;
   const bool derivatives = rate || second;
-  const py::object result = (*call_)(t, derivatives);
+  const py::object result = of_user(what_ + " at t = " + short_number(t) + " s", [&] { return (*call_)(t, derivatives); });
   if (!derivatives) return take(result, size_, value, what_);
   const py::tuple all(result);
   double* const to[] = {value, rate, second};

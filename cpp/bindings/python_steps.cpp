@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bindings/users_function.h"
 #include "model/checks.h"
 #include "runtime/errors.h"
 #include "runtime/interrupt.h"
@@ -79,7 +80,8 @@ class PythonEquations : public ExplicitEquations<double> {
     if ((++evaluations & 63) == 0) check_interrupt();
     at_q_ = q, at_v_ = v;
     const py::gil_scoped_acquire gil;
-    const Array found = numbers((*call_)(t, array_of(q, nq()), array_of(v, nv())), "the right-hand side");
+    const py::object given = of_user("the right-hand side at t = " + short_number(t) + " s", [&] { return (*call_)(t, array_of(q, nq()), array_of(v, nv())); });
+    const Array found = numbers(given, "the right-hand side");
     if (found.size() != nv()) throw EvaluationError("the right-hand side gives " + std::to_string(found.size()) + " numbers at t = " + short_number(t) + " s; it gives the accelerations, " + std::to_string(nv()));
     std::copy_n(found.data(), nv(), vdot);
   }
@@ -112,7 +114,7 @@ PythonEvents::PythonEvents(const py::list& given, int nq, int nv, int own) : nq(
 double PythonEvents::value(int event, double t, const std::vector<double>& x) const {
   const py::gil_scoped_acquire gil;
   const std::string name = "event '" + kinds[event].name + "'", when = " at t = " + short_number(t) + " s";
-  const py::object found = (*calls[event])(t, array_of(x.data(), nq), array_of(x.data() + nq, nv), array_of(x.data() + nq + nv, own));
+  const py::object found = of_user(name + when, [&] { return (*calls[event])(t, array_of(x.data(), nq), array_of(x.data() + nq, nv), array_of(x.data() + nq + nv, own)); });
   Array number;
   try {
     number = real_array(found);

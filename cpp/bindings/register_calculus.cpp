@@ -139,6 +139,10 @@ T time_derivative(const T& operand, const py::object& vdot, const std::string& f
 }  // namespace
 
 void register_calculus(py::module_& m) {
+  m.def("_moved", [](const std::vector<Expression>& operands) -> std::shared_ptr<SkoSource> {
+    if (const auto embedded = embedding_of(operands)) return embedded;
+    return model_of(operands);
+  }, py::arg("operands"), "Whose coordinates diff() is along: embedded loops or a multibody model; None where nothing moves.");
   const char* diff_text =
       "The derivative along a coordinate (its name or number), along a parameter (body.symbol(\"mass\"), hinge.symbol(\"axis\", 0), ...), or\n"
       "along several in turn: diff(i, j) is ∂_j(∂_i ·), and diff([i, j]) the list of both. An expression again, by rule, evaluated by sweeps; zero by structure is the zero\n"

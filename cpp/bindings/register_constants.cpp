@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "bindings/bindings.h"
+#include "bindings/users_function.h"
+#include "numerics/finite.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -78,11 +80,12 @@ Expression external_operator(const py::object& product, const py::object& transp
       py::array_t<double> a({static_cast<py::ssize_t>(in), static_cast<py::ssize_t>(m)});
       std::copy_n(x, size_t(in) * m, a.mutable_data());
       const std::string what = "the result of '" + name + "', an operator from outside,";
-      const Array r = numbers(held->f(a), what.c_str());
+      const Array r = numbers(of_user("the operator from outside '" + name + "'", [&] { return held->f(a); }), what.c_str());
       const bool fits = (r.ndim() == 2 && r.shape(0) == out && r.shape(1) == m) || (r.ndim() == 1 && m == 1 && r.shape(0) == out);
       if (!fits)
         throw EvaluationError(what + " is " + shape_text(r) + "; of an array (" + std::to_string(in) + ", " + std::to_string(m) + ") it is (" + std::to_string(out) +
                               ", " + std::to_string(m) + ")");
+      if (!all_finite(r.data(), size_t(r.size()))) throw EvaluationError(what + " has an entry that is no finite number");
       std::copy_n(r.data(), r.size(), y);
     };
   };

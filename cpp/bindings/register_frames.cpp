@@ -3,6 +3,7 @@
 
 #include "bindings/direct_calls.h"
 #include "bindings/hinge_arguments.h"
+#include "bindings/users_function.h"
 #include "dynamics/frame_cache.h"
 #include "dynamics/frame_calls.h"
 #include "model/checks.h"
@@ -24,8 +25,8 @@ struct PythonMotion {
 
   FrameMotion operator()(double t) const {
     py::gil_scoped_acquire gil;
-    const py::object given = f(t);
     const std::string what = "of the motion of frame '" + frame + "' at t = " + short_number(t);
+    const py::object given = of_user("the motion of frame '" + frame + "' at t = " + short_number(t), [&] { return f(t); });
     FrameMotion motion;
     if (!py::isinstance<py::tuple>(given)) {
       motion.pose = pose(given, what);

@@ -3,6 +3,7 @@
 
 #include "bindings/direct_calls.h"
 #include "bindings/python_steps.h"
+#include "bindings/run_record.h"
 #include "model/configuration.h"
 #include "simulation/effects/damping.h"
 #include "simulation/effects/gravity.h"
@@ -73,8 +74,10 @@ struct Samples : Watcher<S> {
     for (int j = 0; j < nq; ++j) *to_q++ = to_double(x[j]);
     for (int j = 0; j < nv; ++j) *to_v++ = to_double(x[nq + j]);
   }
+  bool stiff(const S& t, const std::vector<S>& x, const S& step, const S& last) override { return examine && examine(t, x, step, last); }
   double *to_q, *to_v;
   int nq, nv;
+  std::function<bool(const S&, const std::vector<S>&, const S&, const S&)> examine;  // whether the motion is stiff, told of where it is
 };
 
 // What a trajectory is of.
@@ -83,6 +86,7 @@ struct Motion {
   std::vector<double> q, v, times, tau, damping;
   IntegratorOptions options;
   Solving how;
+  py::object stiff;                     // is told once that the motion is stiff
   py::object foreign, right_hand_side;  // a solver from outside of the core, accelerations of a user's own; None: no such
 };
 
@@ -114,6 +118,14 @@ IntegrationCost run_motion(const Motion& m, double* q, double* v) {
     return end.cost;
   }
   Samples<S> samples(q, v, mb.nq(), mb.nv());
+  if (!m.stiff.is_none())
+    samples.examine = [&](const S& t, const std::vector<S>& x, const S& step, const S& last) {
+      const std::optional<Stiffness> found = stiffness_at(scene, t, x, step, last);
+      if (!found) return false;
+      const py::gil_scoped_acquire gil;
+      m.stiff(as_dict(*found));
+      return true;
+    };
   const Paired<S> pair = paired(scene, false, m.options);
   RunEnd<S> end_of_wide;
   run_along<S>(m, *pair.equations, *pair.stepper, true, samples, end_of_wide);
@@ -154,7 +166,8 @@ void register_integration(py::module_& m) {
       }, py::arg("q"), py::arg("v"), py::arg("precision"), py::arg("out"))
       .def("trajectory", [](Integration& d, const py::object& q, const py::object& v, const std::vector<double>& times, const py::object& tau,
                             const py::object& damping, const std::string& integrator, double rtol, double atol, double step, bool normalise,
-                            Precision precision, Form form, const py::object& refine, const py::object& foreign, const py::object& right_hand_side) {
+                            Precision precision, Form form, const py::object& refine, const py::object& foreign, const py::object& right_hand_side,
+                            const py::object& stiff) {
         const Multibody& mb = d.model();
         const Array q0 = numbers(q, "q"), v0 = numbers(v, "v");
         mb.check_q(q0.data(), q0.size());
@@ -162,7 +175,7 @@ void register_integration(py::module_& m) {
         IntegratorOptions options{Integrator::dopri5, rtol, atol, step, normalise};
         if (foreign.is_none()) options.integrator = integrator_from_name(integrator);
         const Motion motion{d.shared_model(), {q0.data(), q0.data() + q0.size()}, {v0.data(), v0.data() + v0.size()}, times, vector_of(mb, tau, "tau"),
-                            damping.is_none() ? std::vector<double>() : vector_of(mb, damping, "damping"), options, Solving{form, refinement(refine, "same", precision), OnSingular::raise}, foreign, right_hand_side};
+                            damping.is_none() ? std::vector<double>() : vector_of(mb, damping, "damping"), options, Solving{form, refinement(refine, "same", precision), OnSingular::raise}, stiff, foreign, right_hand_side};
         switch (precision) {
           case Precision::double_: return trajectory<double>(motion);
           case Precision::extended: return trajectory<Extended>(motion);
@@ -171,12 +184,13 @@ void register_integration(py::module_& m) {
         }
         throw EvaluationError("trajectories are computed in precision 'double', 'extended' or 'quad', not '" + std::string(precision_name(precision)) + "'");
       }, py::arg("q"), py::arg("v"), py::arg("times"), py::arg("tau"), py::arg("damping"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"),
-           py::arg("step"), py::arg("normalise"), py::arg("precision"), py::arg("form"), py::arg("refine"), py::arg("foreign") = py::none(), py::arg("right_hand_side") = py::none());
+           py::arg("step"), py::arg("normalise"), py::arg("precision"), py::arg("form"), py::arg("refine"), py::arg("foreign") = py::none(), py::arg("right_hand_side") = py::none(), py::arg("stiff") = py::none());
   m.def("integrators", [] {
     std::vector<std::string> names;
     for (const IntegratorRecord& r : integrator_records) names.push_back(r.name);
     return names;
   }, "The names of the core's integrators.");
+  m.def("retired_integrator", &retired_integrator, py::arg("name"), "What to take in place of an integrator that there was once; empty: there was none of that name.");
 }
 
 }  // namespace pycraft

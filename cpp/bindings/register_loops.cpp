@@ -7,6 +7,7 @@
 #include "bindings/hinge_arguments.h"
 #include "bindings/register_interbody_forces.h"
 #include "bindings/tapes.h"
+#include "bindings/users_function.h"
 #include "dynamics/calls_on_loops.h"
 #include "dynamics/loop_calls.h"
 #include "dynamics/recorded_on_loops.h"
@@ -34,8 +35,8 @@ struct PythonCoupling {
 
   void operator()(int n, const double* q, double* r, double* gradient, double* second, double* third) const {
     py::gil_scoped_acquire gil;
-    const py::object given = f(py::array_t<double>(n, q));
     const std::string what = "the function of coupling '" + coupling + "'";
+    const py::object given = of_user(what, [&] { return f(py::array_t<double>(n, q)); });
     if (!py::isinstance<py::tuple>(given) || (py::len(given) != 3 && py::len(given) != 4))
       throw ModelError(what + " returns (r, gradient, second derivatives), of shapes (), (n,), (n, n), and third ones (n, n, n) if it has them; no difference is taken in their place");
     const py::tuple parts = given;

@@ -62,6 +62,7 @@ struct Asked {
   const py::object* progress;  // null: not wanted
   const py::object* foreign;   // null: an integrator of the core
   const WrittenCheckpoint* checkpoint;
+  const py::object* stiff = nullptr;   // is told once that the motion is stiff; null: not wanted
   StatesTogether* others = nullptr;  // null: a run by itself
 };
 
@@ -106,13 +107,15 @@ void run_in(CompiledScene<S>& scene, const std::vector<double>& q, const std::ve
     const std::vector<S> wq = wide<S>(q), wv = wide<S>(v), y = wide<S>(own);
     x = SceneEquations<S>(scene, works).initial(S(asked.times.front()), wq.data(), wv.data(), own.empty() ? nullptr : y.data());
   }
-  Recorder<S> recorder(record, SceneEquations<S>::unit_of_work(), asked.progress);
+  Recorder<S> recorder(record, SceneEquations<S>::unit_of_work(), asked.progress,
+                       [&scene](const S& t, const std::vector<S>& x, const S& step, const S& last) { return stiffness_at(scene, t, x, step, last); }, asked.stiff);
   RunEnd<S> end;
   const RunPlan<S> plan{asked.times, asked.end_at_times, asked.events.functions<S>(), asked.checkpoint ? &resumed : nullptr};
   const auto start = std::chrono::steady_clock::now();
   const auto close = [&] {
     record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     record.in_packs = scene.in_packs() - packed_before;
+    record.switches = end.switches;
     record.cost = end.cost, record.ended_by = end.event, record.checkpoint = written(end.checkpoint);
     record.passes = scene.passes(list);
     for (size_t i = 0; i < before.size(); ++i) record.passes[i].times -= before[i].times;
@@ -295,6 +298,8 @@ void register_runs(py::module_& m) {
       .def_property_readonly("events", [](const RunRecord& r) { return py::make_tuple(r.event_of, as_dict(r.events, r, 0)); }, "Numbers of events, and the states at them.")
       .def_property_readonly("own_events", [](const RunRecord& r) { return r.own_events; }, "Events of the effects' own, by the effects; those that were asked for follow them.")
       .def_property_readonly("ended_by", [](const RunRecord& r) { return r.ended_by; }, "The event that ended it, -1: none.")
+      .def_property_readonly("stiffness", [](const RunRecord& r) { return r.stiffness ? py::object(as_dict(*r.stiffness)) : py::object(py::none()); }, "What holds the steps of an explicit method, None: nothing.")
+      .def_property_readonly("switches", [](const RunRecord& r) { return r.switches; }, "From when on which of several methods took the steps.")
       .def_property_readonly("checkpoint", [](const RunRecord& r) { return as_dict(r.checkpoint); })
       .def_property_readonly("statistics", [](const RunRecord& r) {
         py::dict d;
@@ -305,7 +310,7 @@ void register_runs(py::module_& m) {
       .def("raise_error", [](const RunRecord& r) { if (r.error) std::rethrow_exception(r.error); }, "What ended one run among several is raised.");
   m.def("run_scene", [](SceneCalls& calls, RunRecord& record, const py::object& q, const py::object& v, const std::vector<double>& times, const std::vector<double>& own, bool energy,
                         const std::string& integrator, double rtol, double atol, double step, double max_step, bool normalise, const py::list& events, const py::object& progress,
-                        const py::object& checkpoint, const py::object& foreign) {
+                        const py::object& checkpoint, const py::object& foreign, const py::object& stiff) {
     int states = 0;
     {
       const ModelInUse use(calls.scene().model());
@@ -318,9 +323,9 @@ void register_runs(py::module_& m) {
     WrittenCheckpoint from;
     if (!checkpoint.is_none()) from = checkpoint_from(checkpoint);
     run(calls, record, numbers(q, "q"), numbers(v, "v"),
-        {times, own, energy, false, options, looked_for, progress.is_none() ? nullptr : &progress, foreign.is_none() ? nullptr : &foreign, checkpoint.is_none() ? nullptr : &from});
+        {times, own, energy, false, options, looked_for, progress.is_none() ? nullptr : &progress, foreign.is_none() ? nullptr : &foreign, checkpoint.is_none() ? nullptr : &from, stiff.is_none() ? nullptr : &stiff});
   }, py::arg("calls"), py::arg("record"), py::arg("q"), py::arg("v"), py::arg("times"), py::arg("own"), py::arg("energy"), py::arg("integrator"), py::arg("rtol"), py::arg("atol"), py::arg("step"),
-     py::arg("max_step"), py::arg("normalise"), py::arg("events"), py::arg("progress"), py::arg("checkpoint"), py::arg("foreign"));
+     py::arg("max_step"), py::arg("normalise"), py::arg("events"), py::arg("progress"), py::arg("checkpoint"), py::arg("foreign"), py::arg("stiff") = py::none());
   m.def("run_scenes", [](const std::vector<SceneCalls*>& calls, const std::vector<RunRecord*>& records, const Array& q, const Array& v, const std::vector<double>& times, bool energy,
                          const std::string& integrator, double rtol, double atol, double step, double max_step, bool normalise) {
     if (calls.empty()) return;

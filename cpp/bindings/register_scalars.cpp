@@ -77,7 +77,8 @@ void register_scalars(py::module_& m) {
          "without coordinates.")
       .def("gradient", [](const Scalar& s, const std::string& over) { return of_face("scalar_gradient")(s, over); },
            py::arg("over") = "coordinates",
-           "All derivatives at once, as an array: over \"coordinates\" (nv,), or (B, nv) where a batch is bound. Of ln det(HφMφ*H* [+ J]) and\n"
+           "All derivatives at once, as an array: over \"coordinates\" (nv,), or (B, nv) where a batch is bound; where loops are embedded along the\n"
+           "independent coordinates, zero where nothing moves. Of ln det(HφMφ*H* [+ J]) and\n"
            "ln det D in three sweeps, O(N), and then also over \"inertias\", \"geometry\", \"axes\" (see\n"
            "Multibody.log_determinant_gradient); of any other scalar one derivative after the other, O(N) each.")
       .def("operands", [](const Scalar& s) {

@@ -11,7 +11,7 @@
 #include "operators/grouped_operators.h"
 #include "operators/loop_operators.h"
 #include "operators/rerooted_tree.h"
-#include "runtime/errors.h"
+#include "runtime/of_state.h"
 
 namespace pycraft {
 
@@ -131,7 +131,7 @@ std::shared_ptr<const Binding> make_binding(const std::vector<Expression>& opera
     }
     for (const auto& s : sources)
       for (int b = 0; b < std::max(states, binding->batch == 0 ? 0 : 1); ++b)
-        s->check_state(binding->q.data() + size_t(b) * width, width, binding->v.data() + size_t(b) * nv, nv);
+        checking_state(b, states, [&] { s->check_state(binding->q.data() + size_t(b) * width, width, binding->v.data() + size_t(b) * nv, nv); });
     if (binding->batch == 0 && width != nq) throw ModelError("q takes " + std::to_string(nq) + " numbers a state, not " + std::to_string(width));
   }
   binding->nq = nq;

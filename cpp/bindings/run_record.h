@@ -3,13 +3,16 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "bindings/bindings.h"
 #include "simulation/compiled_scene.h"
 #include "simulation/integrators/integrate.h"
+#include "simulation/stiffness.h"
 
 namespace pycraft {
 
@@ -36,6 +39,8 @@ struct RunRecord {
   IntegrationCost cost;
   long linearizations = 0, solutions = 0, in_packs = 0;
   double seconds = 0;
+  std::optional<Stiffness> stiffness;              // where stability holds the steps of an explicit method
+  std::vector<std::pair<double, int>> switches;    // RunEnd's
   std::vector<PassRecord> passes;
   WrittenCheckpoint checkpoint;
   std::exception_ptr error;  // of one run among several: what ended it
@@ -61,12 +66,20 @@ Checkpoint<S> read(const WrittenCheckpoint& w) {
   return c;
 }
 
-// Writes a run down. unit: of works in x.
+inline py::dict as_dict(const Stiffness& s) {
+  py::dict d;
+  d["t"] = s.t, d["step"] = s.step, d["rate"] = s.rate, d["left"] = s.left, d["effect"] = s.effect, d["coordinate"] = s.coordinate;
+  return d;
+}
+
+// Writes a run down. unit: of works in x. examine: what is stiff at a state, nothing where the steps are not held by it; said: is told of that.
 template <class S>
 class Recorder : public Watcher<S> {
  public:
   using State = std::vector<S>;
-  Recorder(RunRecord& record, const S& unit, const py::object* progress) : record_(record), unit_(unit), progress_(progress) {}
+  using Examine = std::function<std::optional<Stiffness>(const S& t, const State& x, const S& step, const S& last)>;
+  Recorder(RunRecord& record, const S& unit, const py::object* progress, Examine examine = {}, const py::object* said = nullptr)
+      : record_(record), unit_(unit), progress_(progress), examine_(std::move(examine)), said_(said) {}
   void step(const S& t, const State& x) override {
     if (record_.keeps_steps) append(record_.steps, t, x, record_.works);
   }
@@ -74,6 +87,14 @@ class Recorder : public Watcher<S> {
   void event(int number, const S& t, const State& x) override {
     record_.event_of.push_back(number);
     append(record_.events, t, x, 0);
+  }
+  bool stiff(const S& t, const State& x, const S& step, const S& last) override {
+    if (!examine_ || !(record_.stiffness = examine_(t, x, step, last))) return false;
+    if (said_) {
+      const py::gil_scoped_acquire gil;
+      (*said_)(as_dict(*record_.stiffness));
+    }
+    return true;
   }
   void progress(double t) override {
     if (!progress_) return;
@@ -93,6 +114,8 @@ class Recorder : public Watcher<S> {
   RunRecord& record_;
   S unit_;
   const py::object* progress_;
+  Examine examine_;
+  const py::object* said_;
 };
 
 }  // namespace pycraft

@@ -1,5 +1,7 @@
 #include "dynamics/batches.h"
 
+#include "runtime/of_state.h"
+
 namespace pycraft {
 
 int common_batch(Givens given) {
@@ -27,12 +29,13 @@ void check_widths(const Multibody& model, Givens given) {
 void check_given(const Multibody& model, Givens given) {
   check_widths(model, given);
   for (const Given& g : given)
-    for (int b = 0; b < (g.batch < 0 ? 1 : g.batch); ++b) {
-      if (g.is_configuration())
-        model.check_q(g.at(b), g.width);
-      else
-        model.check_v(g.at(b), g.width, g.name);
-    }
+    for (int b = 0; b < (g.batch < 0 ? 1 : g.batch); ++b)
+      checking_state(b, g.batch, [&] {
+        if (g.is_configuration())
+          model.check_q(g.at(b), g.width);
+        else
+          model.check_v(g.at(b), g.width, g.name);
+      });
 }
 
 void require_finite(const double* x, size_t n, const Multibody& model) {

@@ -8,7 +8,7 @@
 #include "numerics/recorded.h"
 #include "recursions/kinematics.h"
 #include "recursions/newton_euler.h"
-#include "runtime/errors.h"
+#include "runtime/of_state.h"
 
 namespace pycraft {
 
@@ -85,9 +85,11 @@ int BatchInterbodyForces::Asked::states() const {
 void BatchInterbodyForces::check(const Asked& asked) const {
   check_given(model(), {asked.q, asked.v, asked.input});
   for (int b = 0; b < (asked.wrenches.batch < 0 ? 1 : asked.wrenches.batch); ++b)
-    for (int i = 0; i < asked.wrenches.width; ++i)
-      if (const double x = asked.wrenches.at(b)[i]; !std::isfinite(x))
-        throw ModelError("the wrench on '" + asked.pushed->nodes[i / 6].name + "' has an entry that is not finite");
+    checking_state(b, asked.wrenches.batch, [&] {
+      for (int i = 0; i < asked.wrenches.width; ++i)
+        if (const double x = asked.wrenches.at(b)[i]; !std::isfinite(x))
+          throw ModelError("the wrench on '" + asked.pushed->nodes[i / 6].name + "' has an entry that is not finite");
+    });
 }
 
 void BatchInterbodyForces::run(const Asked& asked, const Results& out) {

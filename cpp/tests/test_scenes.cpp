@@ -195,7 +195,7 @@ BOOST_AUTO_TEST_CASE(an_effect_of_ones_own_with_a_state) {
   SceneEquations<Quad> equations(compiled, true);
   const Quad zero(0);
   std::vector<Quad> end;
-  integrate<Quad>(equations, equations.initial(Quad(0), &zero, &zero, nullptr), {0, 1}, {Integrator::fehlberg78, 1e-20, 1e-22}, [&](const Quad&, const std::vector<Quad>& x) { end = x; });
+  integrate<Quad>(equations, equations.initial(Quad(0), &zero, &zero, nullptr), {0, 1}, {Integrator::dop853, 1e-20, 1e-22}, [&](const Quad&, const std::vector<Quad>& x) { end = x; });
   using std::exp;
   const Quad level = Quad(2) * exp(Quad(-1)), speed = Quad(3) * (Quad(2) - level) / Quad(2);  // m v̇ = 3 y
   BOOST_TEST(to_double(Quad(end[2] - level)) < 1e-19);

@@ -166,6 +166,32 @@ def _traced_system(TreeSystem: type, graph: Graph, functions: _Functions) -> typ
     return TracedTreeSystem
 
 
+_DERIVED = {
+    "hinge subset": "the tree of free or of prescribed coordinates",
+    "world frame": "the tree in world axes",
+    "cut tree": "the tree cut at a hinge",
+    "another root": "the tree with another root",
+    "loops": "the rows of loops",
+    "groups of bodies": "the tree of grouped bodies",
+    "embedded loops": "the tree of embedded loops",
+}
+
+
+def _check_recordable(source: Any, expression: Any) -> None:
+    """Raise EvaluationError where the letters of a tree are known as numbers at a state alone, and would stay what they are now."""
+    if isinstance(source, (_core.MultibodyOperators, _core.MatrixTree)):
+        return
+    made = source.derived_from
+    if made is None and isinstance(source.__reduce__()[1][0], _core.MatrixTree):  # bodies in pairs, of a tree that does not move
+        return
+    what = _DERIVED[made[0]] if made is not None else "the tree of bodies in pairs"
+    raise _core.EvaluationError(
+        f"compile() cannot record {expression.text()}: it has letters of {source.name!r}, {what}, which compile() does not know as "
+        "functions of q, so that the code would keep their values at the model's present state. Evaluate it by at(q), which takes "
+        "batches; or compile it at one state: at(q).compile()"
+    )
+
+
 def _scale(model: Any) -> float:
     """What a hinge can feel at most: all masses at the length of all of the way, and their own inertias."""
     bodies = describe(model)["bodies"]
@@ -189,6 +215,9 @@ class ExpressionGraph:
         if request not in REQUESTS:
             raise _core.EvaluationError(f"compile() makes {', '.join(map(repr, REQUESTS))}, not {request!r}")
         algorithm = Algorithm(expression, "python", request)
+        for model in algorithm._book.models:
+            if not model.binding:
+                _check_recordable(model.source, expression)
         self.graph = Graph()
         free = [m for m in algorithm._book.models if not m.binding and isinstance(m.source, _core.MultibodyOperators)]
         if len(free) > 1:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from .inverse_on_loops import ConstrainedInverseCalls
 from .quadratic import QuadraticCalls
 from .statics import StaticsCalls
 from .statistical import StatisticalCalls
+from .stiff_motion import TAKE, TAKE_DOUBLE, stiffness_text
 from .task_space import TaskSpaceCalls
 
 if TYPE_CHECKING:
@@ -42,6 +45,11 @@ class IntegrationCalls(
 
     nq: int
     name: str
+
+    if TYPE_CHECKING:
+
+        def _say(self, text: str) -> None:
+            """Warn, at the line outside the package."""
 
     def _integration(self) -> _core.Integration:
         return cached(self, "_trajectories", _core.Integration)
@@ -79,10 +87,11 @@ class IntegrationCalls(
         q, v : (nq,), (nv,) at times[0]; q may be a State, which brings its v where v is None; None for the model's present state
         times : (T,) s, strictly increasing or strictly decreasing
         tau, damping : (nv,) constant generalized forces, and viscous damping coefficients; zero by default
-        integrator : {"dopri5", "fehlberg78", "rosenbrock4", "rkmk4", "variational2", "dop853", "radau", "cvode", ...}
+        integrator : {"dopri5", "dop853", "rosenbrock4", "rkmk4", "variational2", "scipy:DOP853", "radau", "cvode", ...}
             `pycraft.dynamics.integrator_names.integrator_names()` lists them, docs/simulation.md says when to take which. The core's end a
             step at every time asked for. SciPy's ("scipy:RK45", "scipy:DOP853", "scipy:Radau", "scipy:BDF", "scipy:LSODA", or the last part
-            alone) and those of SUNDIALS ("sundials:BDF" or "cvode", "sundials:Adams"; extra [sundials]) interpolate, and call from Python.
+            alone, where "dop853" is the core's and "DOP853" SciPy's) and those of SUNDIALS ("sundials:BDF" or "cvode", "sundials:Adams";
+            extra [sundials]) interpolate, and call from Python.
         rtol, atol : tolerances on the error of one step, per component of (q, v)
         step : s
             Of one-size steps (the largest that divides the interval and is at most this); the first step of the others, chosen if left out.
@@ -106,7 +115,7 @@ class IntegrationCalls(
         >>> import pycraft as pc
         >>> arm = pc.chain(2)
         >>> arm.gravity = (0, 0, -9.81)
-        >>> motion = arm.integrate_ode(arm.q, arm.v, [0, 0.5, 1], integrator="fehlberg78")
+        >>> motion = arm.integrate_ode(arm.q, arm.v, [0, 0.5, 1], integrator="dop853")
         >>> motion.q.shape
         (3, 2)
         """
@@ -122,8 +131,12 @@ class IntegrationCalls(
         q, v = at_state(self, q, v)
         return self._trajectory(
             integrates, q, v, _checked_times(times), tau=tau, damping=damping, rtol=rtol, atol=atol, step=step,
-            normalise=normalise != "never", precision=precision, form=form, refine=refine,
+            normalise=normalise != "never", precision=precision, form=form, refine=refine, told=True,
         )  # fmt: skip
+
+    def _stiff(self, integrator: str, precision: Any, found: Mapping[str, Any]) -> None:
+        remedy = TAKE if precision == "double" else TAKE_DOUBLE
+        self._say(stiffness_text(f"the motion of {self.name!r}", integrator, found, remedy))
 
     def _trajectory(
         self,
@@ -142,15 +155,19 @@ class IntegrationCalls(
         form: str = "fast",
         refine: Any = 0,
         right_hand_side=None,
+        told: bool = False,
     ) -> Trajectory:
-        """The same of arguments that are checked. right_hand_side: (t, q, v) -> v̇ in place of forward dynamics, for explicit methods."""
+        """The same of arguments that are checked. right_hand_side: (t, q, v) -> v̇ in place of forward dynamics, for explicit methods.
+
+        told : whether a ModelWarning says that the motion is stiff.
+        """
         from .trajectory import Trajectory
 
         solver = chosen.solver(float(rtol), float(atol))
         tolerances = (1.0, 1.0) if chosen.foreign else (float(rtol), float(atol))
         run = self._integration().trajectory(
             q, v, times.tolist(), tau, damping, chosen.name, *tolerances, float(step or 0), normalise, precision, form, refine, solver,
-            right_hand_side,
+            right_hand_side, partial(self._stiff, chosen.name, precision) if told else None,
         )  # fmt: skip
         return Trajectory(times, run["q"], run["v"], run["evaluations"], run["seconds"], run["steps"], run["rejected"])
 

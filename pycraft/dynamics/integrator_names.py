@@ -8,10 +8,11 @@ from typing import Any
 from .. import _core
 
 SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
-"""SciPy's solvers; as integrators they are called "scipy:RK45" and so on, or "rk45" for short."""
+"""SciPy's solvers; as integrators they are called "scipy:RK45", or "RK45" or "rk45" for short; but "dop853" is the core's."""
 SUNDIALS = ("BDF", "Adams")
 """The methods of SUNDIALS' CVODE; "sundials:BDF", "cvode" for short, and "sundials:Adams"."""
 SHORT = {name.lower(): f"scipy:{name}" for name in SCIPY} | {"cvode": "sundials:BDF", "adams": "sundials:Adams"}
+"""By lower-case names: no integrator of the core is called so, except "dop853", which only SciPy's own spelling DOP853 distinguishes."""
 SOLVE_FOR_STEPS = ("scipy:Radau", "scipy:BDF", "scipy:LSODA", "sundials:BDF")
 """Those from outside of the core that take implicit steps, for stiff motion."""
 
@@ -42,8 +43,10 @@ def integrator_names() -> list[str]:
 
 
 def integrator_named(name: Any) -> IntegratorName:
-    """The integrator of a name, or of a short one. EvaluationError lists those there are."""
-    given = SHORT.get(name.lower(), name) if isinstance(name, str) else name
+    """The integrator of a name, or of a short one; the core's names come first. EvaluationError lists those there are."""
+    given = SHORT.get(name.lower(), name) if isinstance(name, str) and name not in _core.integrators() else name
+    if isinstance(given, str) and (instead := _core.retired_integrator(given)):
+        raise _core.EvaluationError(instead)
     if not isinstance(given, str) or given not in integrator_names():
         raise _core.EvaluationError(f"no integrator is called {name!r}; there are {', '.join(map(repr, integrator_names()))}")
     return IntegratorName(given, ":" in given)

@@ -292,5 +292,14 @@ def in_axes(model: Any, q: Any, f: np.ndarray, X: np.ndarray, axes: Any, about: 
             point = np.asarray(_core.real_array(about, "about"), float)
             if point.shape != (3,) or not np.isfinite(point).all():
                 raise _core.ModelError(f"about: a frame, or three finite numbers in the world's axes, not {about!r:.80}")
-    moment = moment + np.cross(p - point, force)
-    return np.concatenate([np.einsum("...ji,...j->...i", turn, moment), np.einsum("...ji,...j->...i", turn, force)], axis=-1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        moment = moment + np.cross(p - point, force)
+        made = np.concatenate([np.einsum("...ji,...j->...i", turn, moment), np.einsum("...ji,...j->...i", turn, force)], axis=-1)
+    if not np.isfinite(made).all():
+        count = len(q) if np.ndim(q) == 2 else 0
+        first = int(np.argmin(np.isfinite(made).reshape(count, -1).all(axis=1))) if count > 1 else 0
+        state = f" (state {first} of a batch of {count})" if count > 1 else ""
+        raise _core.EvaluationError(
+            f"moments of {model.name!r} about that point are beyond the range of numbers: it is too far from the hinges{state}"
+        )
+    return made

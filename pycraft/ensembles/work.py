@@ -74,6 +74,7 @@ class SceneWork:
             self._targets = Targets(self.scene, self.names)
         q, v = self._targets.set(row)
         self.scene._limits_said = True  # a sweep has thousands of runs; `crossed_limits` of each says them
+        self.scene._doubts_said = {"energy", "atol"}  # the balance is among what each keeps
         return self.measure(self.scene.simulate(self.T, q, v, progress=False, **self.options))
 
     def __post_init__(self) -> None:

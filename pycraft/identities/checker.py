@@ -268,10 +268,16 @@ def _explain(report: CheckReport, text: str, **options: Any) -> None:
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
         report.notes.append("it cannot be read on random trees: no smaller counterexample was looked for")
     else:
+        spent = f"after {options['budget']:g} s of CPU time (budget={options['budget']:g})"
         if found is None:
-            spent = f"after {options['budget']:g} s of CPU time (budget={options['budget']:g})"
-            report.notes.append(f"the search for hypotheses under which it is true ended {spent}")
+            report.untried = True
+            report.notes.append(f"the search for hypotheses under which it is true ended {spent}: not all were tried")
         else:
+            if found.partial:
+                count = sum(cell.models for cell in found)
+                report.notes.append(
+                    f"every hypothesis was tried, on {count} models in all; the search ended {spent}, before the largest models"
+                )
             report.true_where = saving(found, options.get("traits"))
 
 

@@ -203,6 +203,8 @@ class CheckReport:
     counterexample: Any = None
     true_where: list[frozenset[str]] = field(default_factory=list)
     """Standard hypotheses under which a false statement is true, the weakest first; each set is enough."""
+    untried: bool = False
+    """Whether the search for those hypotheses ended before each was tried."""
     notes: list[str] = field(default_factory=list)
     understood: str = ""
     """How the text was read, in the package's own letters; empty where expressions were given."""
@@ -242,6 +244,8 @@ class CheckReport:
             said = ", or where ".join(in_words(chosen) for chosen in self.true_where)
             return f"TRUE where {said}; FALSE elsewhere"
         met = self.counterexample.meets if self.counterexample is not None else ()
+        if self.untried:
+            return "FALSE in general; hypotheses under which it may be true were not all tried"
         return f"FALSE, also where {in_words(met)}" if met else "FALSE"
 
     def __repr__(self) -> str:

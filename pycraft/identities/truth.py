@@ -15,7 +15,7 @@ from ..file_targets import writable_target
 from ..progress_bar import StepProgress
 from .budget import Budget
 from .dialects import in_dialect
-from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, WITH_J, Cell, family, nilpotency, read_on, specs
+from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, VARIANTS, WITH_J, Cell, Spec, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements, as_text
 from .search import Counterexample, judged, smallest, understood
@@ -61,6 +61,8 @@ class TruthMap:
     seconds: float = 0.0
     understood: str = ""
     """How the text was read, in the package's own letters."""
+    partial: bool = False
+    """Whether a budget ended before the large models of every cell were tried."""
 
     def __iter__(self) -> Iterator[CellTruth]:
         return iter(self.cells)
@@ -256,37 +258,51 @@ def truth_within(
     vectors: Mapping[str, str] | None = None,
     progress: bool = True,
 ) -> TruthMap | None:
-    """The truth map without smallest cases; None where the budget ends first."""
+    """The truth map without smallest cases. Every cell is tried on a small model first; where the budget ends after that and before the
+    large ones were tried, the map is `partial`, and None where it ends earlier."""
     begin = time.perf_counter()
-    depth, cells = depth_for(statement, vectors), []
-    with StepProgress(len(CELLS), "cells of the truth map", progress) as bar:
-        for cell in CELLS:
+    depth = depth_for(statement, vectors)
+    cells = [_CellTrial(cell) for cell in CELLS]
+    rounds = [(turn, trial) for turn in range(VARIANTS) for trial in cells]
+    partial = False
+    with StepProgress(len(rounds), "models in the cells of the truth map", progress) as bar:
+        for turn, trial in rounds:
+            cell = trial.cell
             bar(", ".join((cell.shape, cell.J, cell.hinges, cell.base)))
-            found = _cell_truth(statement, cell, depth, precision, vectors, budget)
-            if found is None:
-                return None
-            cells.append(found)
-    return TruthMap(statement, cells, time.perf_counter() - begin, understood(statement))
+            if trial.refuted is not None:
+                continue
+            if budget.over:
+                if turn == 0:
+                    return None
+                partial = True
+                break
+            trial.judge(statement, specs(cell, depth)[turn], precision, vectors)
+    return TruthMap(statement, [trial.truth() for trial in cells], time.perf_counter() - begin, understood(statement), partial)
 
 
-def _cell_truth(
-    statement: str, cell: Cell, depth: int, precision: str | int, vectors: Mapping[str, str] | None, budget: Budget
-) -> CellTruth | None:
-    """The models of a cell up to the first that refutes; None where the budget ends before."""
-    found = []
-    for spec in specs(cell, depth):
-        if budget.over:
-            return None
+class _CellTrial:
+    """The models of a cell one after the other, up to the first that refutes."""
+
+    def __init__(self, cell: Cell):
+        self.cell = cell
+        self.refuted: Counterexample | None = None
+        self._found: list[str] = []
+
+    def judge(self, statement: str, spec: Spec, precision: str | int, vectors: Mapping[str, str] | None) -> None:
         verdict = judged(statement, spec, 1, precision, vectors)
         if verdict is None:
-            continue
-        found.append(verdict.verdict)
+            return
+        self._found.append(verdict.verdict)
         if verdict.verdict == FAILS:
             shown = verdict.shown
-            return CellTruth(cell, FALSE, len(found), Counterexample(spec, shown.state, shown.decisive.residual))
-    if not found:
-        return CellTruth(cell, UNREAD, 0)
-    return CellTruth(cell, UNDECIDED if UNDECIDED in found else TRUE, len(found))
+            self.refuted = Counterexample(spec, shown.state, shown.decisive.residual)
+
+    def truth(self) -> CellTruth:
+        if self.refuted is not None:
+            return CellTruth(self.cell, FALSE, len(self._found), self.refuted)
+        if not self._found:
+            return CellTruth(self.cell, UNREAD, 0)
+        return CellTruth(self.cell, UNDECIDED if UNDECIDED in self._found else TRUE, len(self._found))
 
 
 def saving(found: TruthMap, traits: Callable[[], dict[str, bool]] | None = None) -> list[frozenset[str]]:
@@ -307,7 +323,7 @@ def explained(
 ) -> tuple[TruthMap | None, Counterexample | None]:
     """(the truth map of a false statement, the case that tells most): the smallest of all where a hypothesis saves it; else the
     smallest that meets all hypotheses under which it still fails, so that it is not blamed on what the true formula does not hold for
-    either. No map where it takes more than the budget, CPU seconds for each of the two."""
+    either. No map where the budget, CPU seconds for each of the two, ends before every cell was tried on one model."""
     found_map = truth_within(statement, Budget(budget), precision, vectors)
     saved = saving(found_map, traits) if found_map is not None else []
     start: Counterexample | None = found

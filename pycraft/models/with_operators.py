@@ -20,6 +20,10 @@ class WithOperators(_core.Multibody):
             self._soa = OperatorSet(_core.operators_of(self), self)
         return self._soa
 
+    def _say(self, text: str) -> None:
+        """Warn, at the line outside the package."""
+        warning.warn(text)
+
     def warn(self) -> None:
         """Say, once, what is legal but worth a word: violated triangle inequalities, massless bodies on hinges."""
         for _, words in self.take_warnings():

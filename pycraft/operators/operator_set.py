@@ -347,9 +347,19 @@ def _sensitivities_of(model: Any) -> _core.Sensitivities:
 
 def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarray:
     """All derivatives of a scalar expression, see `Scalar.gradient`."""
+    moved: Any = _core._moved(scalar.operands())
+    if moved is None:
+        return np.zeros(())  # numbers alone: zero along whatever they are added to
+    if isinstance(moved, _core.MultibodyOperators):
+        return _gradient(scalar, over, moved)
+    return _along_coordinates(scalar, over, moved)  # embedded loops: all of it along the independent ones
+
+
+def _gradient(scalar: _core.Scalar, over: str, source: _core.MultibodyOperators) -> np.ndarray:
+    """Term by term, so that ln det ℳ keeps a sweep of its own."""
     kind, value, operand, terms = scalar.kind, scalar.number, scalar.operand, scalar.terms
     if terms:
-        parts = [scalar_gradient(t, over) for t in terms]
+        parts = [_gradient(t, over, source) for t in terms]
         if kind in ("product", "reciprocal"):
             values = [np.asarray(t.value())[..., None] for t in terms]
             if kind == "reciprocal":
@@ -357,30 +367,31 @@ def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarr
             others = [reduce(mul, values[:i] + values[i + 1 :], 1.0) for i in range(len(terms))]
             return np.asarray(sum(x * part for x, part in zip(others, parts, strict=True)))
         return np.asarray((float(value) if kind == "scaled" else 1.0) * sum(parts))
-    if operand is None:  # a number in a sum
+    if operand is None or _core._moved([operand]) is None:
         return np.zeros(())
-    models = {source.model for source in operand.sources if isinstance(source, _core.MultibodyOperators)}
-    if len(models) != 1:
-        what = "depends on two models: differentiate along one coordinate at a time" if models else "does not depend on a multibody model"
-        raise _core.EvaluationError(f"{scalar!r} has no gradient: it {what}")
-    model: Any = models.pop()
-    if kind == "logdet" and _is_mass_matrix(operand):
-        q, _, precision = operand._state or (model.q, None, "double")
+    if kind == "logdet" and _is_mass_matrix(operand, source):
+        q, _, precision = operand._state or (source.model.q, None, "double")
         binding = _core._binding(operand)
-        call = partial(_sensitivities_of(model).log_determinant, over)
+        call = partial(_sensitivities_of(source.model).log_determinant, over)
         return _core._face["shared_out"](call, ["q"], (q,), {"precision": precision}, binding.threads if binding else 1)
+    return _along_coordinates(scalar, over, source)
+
+
+def _along_coordinates(scalar: _core.Scalar, over: str, source: _core.SkoSource) -> np.ndarray:
     if over != "coordinates":
         raise _core.EvaluationError(f"gradient over {over!r} is there for ln det of the mass matrix and of D, not for {scalar!r}")
-    return np.stack([np.asarray(scalar.diff(i), float) for i in range(model.nv)], axis=-1) if model.nv else np.zeros(0)
+    count = source.Theta.dimension
+    return np.stack([np.asarray(scalar.diff(i), float) for i in range(count)], axis=-1) if count else np.zeros(0)
 
 
-def _is_mass_matrix(operand: _core.Operator) -> bool:
+def _is_mass_matrix(operand: _core.Operator, source: _core.MultibodyOperators) -> bool:
     """HφMφ*H*, with J where there is one, or D: what has the determinant of ℳ + J."""
-    source = next(s for s in operand.sources if isinstance(s, _core.MultibodyOperators))
+    if operand.sources != [source]:
+        return False
     letters = [source.symbol(name) for name in ("H", "phi", "M", "J", "D")]
     if operand._state is not None:
         binding = _core._binding(operand)
         letters = [letter._bound(binding) for letter in letters]
     H, phi, M, J, D = letters
     whole = H @ phi @ M @ phi.T @ H.T + J
-    return len(operand.sources) == 1 and (operand == D or (operand.domain == H.codomain and _core.equal_by_theorems(operand, whole)))
+    return bool(operand == D or (operand.domain == H.codomain and _core.equal_by_theorems(operand, whole)))

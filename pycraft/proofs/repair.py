@@ -186,7 +186,7 @@ def _found(formula: Formula, slip: Slip | None, spending: Budget, before: str = 
             found = truth_within(source, spending)
         except (_core.Error, ArithmeticError):
             found = None
-        where = found.where if found is not None and found.where else where
+        where = found.where if found is not None and not found.partial and found.where else where
     if not where:
         return None
     return Repair(written_statement(formula, shown=True), source, slip.words if slip else "", slip.cost if slip else 0.0, where, proof)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
 from .. import _core
 from ..accuracy.checked_options import checked_model, checked_names, checked_positive, checked_seconds
+from ..accuracy.tables.confirmation import SECOND, Confirmation, about, confirmation, own_error
 from ..accuracy.tables.work_precision import STEPS, WorkPrecisionTable, measured_row, trajectory_error
 from ..arguments import one_number
 from ..dynamics.integrator_names import integrator_names, takes_one_size
@@ -22,11 +24,11 @@ from .scene_accuracy import _as, _at_states, _by, _options
 
 METHODS = ("augment", "embed", "penalty")
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
-KEPT, HELD = ("dopri5", "fehlberg78"), ("dopri5", "rosenbrock4")
+KEPT, HELD = ("dopri5", "dop853"), ("dopri5", "rosenbrock4")
 """Integrators, of loops that are kept; of springs, which are stiff."""
 STIFFER = (10.0, 30.0, 100.0, 300.0, 1000.0)
 """Frequencies of springs, by the rate of the motion."""
-REFERENCE = ("fehlberg78", 1e-13)
+REFERENCE = ("dop853", 1e-13)
 LEAST = 1e-12
 """Of tolerances of what springs hold."""
 
@@ -111,9 +113,10 @@ def loops_compared(
     an integrator and tolerance; of springs one an integrator and frequency ω, at a tolerance of a tenth of what springs leave,
     (rate/ω)²/10, where rate is that of the motion, the largest ‖v̇‖/‖v‖ in kinetic energy.
 
-    The reference is augmentation by fehlberg78 in extended precision at a tolerance of 1e-13 (embedding where that refuses, double where
-    functions of Python's say so). Its own error is its distance to a run at a hundred times that tolerance, and to the same by the other
-    method; rows below it are not resolved.
+    The reference is augmentation by dop853 in extended precision at a tolerance of 1e-13 (embedding where that refuses, double where
+    functions of Python's say so). Its own error is its distance to a run at a hundred times that tolerance, to the same by the other
+    method, and to the motion that an extrapolation method finds; rows below it are not resolved. The table says to how many digits the
+    last agrees with the reference.
 
     Parameters
     ----------
@@ -121,7 +124,7 @@ def loops_compared(
     q, v : (nq,), (nv,) at t = 0 on the loops, by the rule of direct calls
     T : s, of the run
     methods : of "augment", "embed", "penalty"
-    integrators : as in `simulate`; "dopri5" and "fehlberg78" of loops that are kept, "dopri5" and "rosenbrock4" of springs
+    integrators : as in `simulate`; "dopri5" and "dop853" of loops that are kept, "dopri5" and "rosenbrock4" of springs
     tolerances, steps : of controlled integrators, rtol and atol, of loops that are kept; s, of integrators with steps of one size
     frequencies, damping_ratio : rad/s, of `effects.Loop(method="penalty")`; 10, 30, 100, 300 and 1000 times the rate of the motion
     seconds : a run is repeated until this is spent, once at least; the least time counts
@@ -183,7 +186,7 @@ def loops_compared(
         rows,
         {
             "model": model.name, "nv": model.nv, "T": length, "loops": comparison.names, "rows": len(comparison.rows),
-            "reference": comparison.reference, "reference_error": comparison.own, "rate": comparison.rate,
+            "reference": comparison.reference, "reference_error": comparison.own, **about(comparison.confirmation), "rate": comparison.rate,
             "q": np.asarray(comparison.q).tolist(), "v": np.asarray(comparison.v).tolist(), "effects": effects_on(scene),
         },
     )  # fmt: skip
@@ -231,16 +234,23 @@ class _Comparison:
             raise _core.EvaluationError(f"no reference for the loops of {self.model.name!r}: {'; '.join(refused)}")
         method = next(iter(runs))
         self.truth = runs.pop(method)
-        self.own = max(trajectory_error(self.model, self.truth.q, other.q) for other in runs.values())
+        other, _ = self.by(method, _as(plain, (*plain._how[:3], precision)))
+        self.confirmation: Confirmation = confirmation(
+            self.truth.q,
+            lambda: self._tight(other, 1.0, SECOND).q,
+            partial(trajectory_error, self.model),
+            f"{SECOND} in {precision} precision",
+        )
+        self.own = own_error(max(trajectory_error(self.model, self.truth.q, run.q) for run in runs.values()), self.confirmation)
         self.reference = f"{method} by {REFERENCE[0]} in {precision} precision, tolerance {REFERENCE[1]:g}"
         M, v, vdot = (np.asarray(x, float) for x in (self.model.mass_matrix(self.truth.q), self.truth.v, self.truth.vdot))
         speed, turned = (float(np.sqrt(max(np.einsum("ti,tij,tj->t", x, M, x).max(), 0.0))) for x in (v, vdot))
         self.rate = max(turned / speed if speed > 0 else 0.0, 1 / self.times[-1])
         self.kinetic = speed**2 / 2
 
-    def _tight(self, scene: Any, times: float) -> Any:
+    def _tight(self, scene: Any, times: float, integrator: str = REFERENCE[0]) -> Any:
         tolerance = times * REFERENCE[1]
-        return run_at(scene, self.times, self.q, self.v, integrator=REFERENCE[0], rtol=tolerance, atol=tolerance)
+        return run_at(scene, self.times, self.q, self.v, integrator=integrator, rtol=tolerance, atol=tolerance)
 
     # ------------------------------------------------------------------ a row
     def row(self, method: str, integrator: str, options: dict[str, float], **springs: Any) -> dict[str, Any]:

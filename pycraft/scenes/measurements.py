@@ -125,7 +125,7 @@ class Measurements:
         ----------
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls
         T : s, of the run
-        integrators : as in `simulate`; "dopri5", "fehlberg78", "rkmk4"
+        integrators : as in `simulate`; "dopri5", "dop853", "rkmk4"
         tolerances, steps : of controlled integrators, rtol and atol; s, of those with steps of one size
         forms, refinements, precisions : as in `pycraft.accuracy`; all forms, none and one with a wider residual, double and extended
         without : effects or sets of them that are left out, as in `compare`; every one that is on

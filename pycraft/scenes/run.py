@@ -29,7 +29,8 @@ class Run(Motion, Renamed):
     ended_by : the name of the event that ended the run, None where it reached its end
     statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that solve by
         derivatives), solutions (of variational ones: of the equations of a step), in_packs (accelerations that were found beside those of
-        other runs of a sweep), and how often each pass ran
+        other runs of a sweep), and how often each pass ran; "stiffness" where stability held the steps of an explicit method (t, step,
+        rate, effect, coordinate); of "auto" "switches", (t, the method that took steps from then on)
 
     What follows from the states is computed when it is first asked for, and kept. StaleOperatorError once the model was edited: the rest is
     of the model as it was.
@@ -78,8 +79,13 @@ class Run(Motion, Renamed):
         kept = record.checkpoint
         what = scene.model.name, tuple(names), coordinates_of(scene.model), precision
         checkpoint = Checkpoint(sum(kept["t"]), *what, integrator, options.told, dict(kept))
+        statistics = dict(record.statistics)
+        if record.stiffness is not None:
+            statistics["stiffness"] = record.stiffness
+        if integrator == "auto":
+            statistics["switches"] = [(t, ("dopri5", "rosenbrock4")[method]) for t, method in record.switches]
         return cls(
-            about, rows, calls, steps=steps if len(steps["t"]) else None, events=happened, statistics=record.statistics,
+            about, rows, calls, steps=steps if len(steps["t"]) else None, events=happened, statistics=statistics,
             ended_by=kinds[record.ended_by] if record.ended_by >= 0 else None, checkpoint=checkpoint,
         )  # fmt: skip
 
@@ -100,10 +106,10 @@ class Run(Motion, Renamed):
     def at(self, t: Any) -> Motion:
         """The states at one time, or at several.
 
-        By the dense output of the integrator where it has one of its own ("dopri5", order 4; "rosenbrock4", order 3), else by Hermite's
-        interpolation in q, v, v̇ on the group between the ends of steps: errors of a step of size h are O(h⁶) in q, O(h⁵) in v and O(h⁴)
-        in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, and straight
-        lines for works and states.
+        By the dense output of the integrator where it has one of its own ("dopri5", order 4; "dop853", 7; "rosenbrock4", 3), else by
+        Hermite's interpolation in q, v, v̇ on the group between the ends of steps: errors of a step of size h are O(h⁶) in q, O(h⁵) in v
+        and O(h⁴) in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, and
+        straight lines for works and states.
 
         Parameters
         ----------
@@ -132,9 +138,7 @@ class Run(Motion, Renamed):
         order = np.argsort(times, kind="stable")
         steps = np.clip(np.searchsorted(rows["t"], times[order], side="left") - 1, 0, len(rows["t"]) - 2)
         if self._calls is not None:
-            integrator = self._about["integrator"] if ":" not in self._about["integrator"] else ""
-            t, q, v, states, work = (rows[name] for name in ("t", "q", "v", "states", "work"))
-            found = _core.scene_between(self._calls, integrator, t, q, v, states, work, times[order].tolist(), steps.tolist())
+            found = self._by_dense_output(rows, times[order], steps)
         else:
             found = self._interpolated(rows, times[order], steps)
         last = np.searchsorted(rows["t"], times[order], side="right") - 1
@@ -142,6 +146,21 @@ class Run(Motion, Renamed):
         found = {name: np.where(jumped.reshape(-1, *[1] * (x.ndim - 1)), rows[name][last], x) for name, x in found.items()}
         back = np.argsort(order, kind="stable")
         return {name: x[back] for name, x in found.items()}
+
+    def _by_dense_output(self, rows: Mapping[str, np.ndarray], times: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
+        """By that of the method which took each step, for times that rise."""
+        integrator = self._about["integrator"] if ":" not in self._about["integrator"] else ""
+        t, q, v, states, work = (rows[name] for name in ("t", "q", "v", "states", "work"))
+        switches = self.statistics.get("switches", [])
+        since = np.searchsorted([at for at, _ in switches], t[steps], side="right") - 1
+        stiff = np.array([i >= 0 and switches[i][1] == "rosenbrock4" for i in since], bool)
+        parts = [
+            (mask, _core.scene_between(self._calls, method, t, q, v, states, work, times[mask].tolist(), steps[mask].tolist()))
+            for mask, method in ((~stiff, integrator), (stiff, "rosenbrock4"))
+            if mask.any()
+        ]
+        back = np.argsort(np.concatenate([np.flatnonzero(mask) for mask, _ in parts]))
+        return {name: np.concatenate([part[name] for _, part in parts])[back] for name in parts[0][1]}
 
     def _interpolated(self, rows: Mapping[str, np.ndarray], times: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
         t, vdot = rows["t"], self._vdot_of_steps

@@ -65,6 +65,6 @@ def to_xarray(run: Any) -> Any:
         "component": ["nx", "ny", "nz", "px", "py", "pz"], "configuration_unit": ("configuration", q_units),
         "coordinate_unit": ("coordinate", v_units), "force_unit": ("coordinate", [POWER[unit] for unit in v_units]),
     }  # fmt: skip
-    counted = {f"statistics_{name}": value for name, value in run.statistics.items() if name != "passes"}
+    counted = {f"statistics_{name}": value for name, value in run.statistics.items() if isinstance(value, (int, float))}
     about = {"model": run.model.name, "integrator": run._about["integrator"], **counted}
     return xarray.Dataset(data | {"momentum": momentum}, coordinates, about)

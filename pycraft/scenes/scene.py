@@ -107,7 +107,8 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         self._how = (form, _core.checked_refinement(refine, chosen(residual, "residual"), precision), residual, precision)
         self._built: tuple[Any, Any] | None = None
         self._last_run: Run | None = None
-        self._gravity_said = self._limits_said = False
+        self._gravity_said = self._limits_said = self._stiffness_said = False
+        self._doubts_said: set[str] = set()
         self._calls()
         if isinstance(model, Grafting):
             model._used_by(self)
@@ -324,9 +325,10 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         ----------
         T : s
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls; prescribed coordinates are their motion's
-        integrator : {"dopri5", "fehlberg78", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "dop853", "cvode", ...}
-            docs/simulation.md says when to take which. "rosenbrock4" is for stiff scenes, "variational2" and "variational4" for long ones;
-            "semi-implicit-euler" (order 1) takes implicit damping and stiffness into D: stable for any.
+        integrator : {"dopri5", "auto", "dop853", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "DOP853", "cvode", ...}
+            docs/simulation.md says when to take which. "rosenbrock4" is for stiff scenes, and "auto" takes it where the motion is stiff;
+            "variational2" and "variational4" are for long ones; "semi-implicit-euler" (order 1) takes implicit damping and stiffness into
+            D: stable for any, while explicit stiffness beside them bounds the step.
         rtol, atol : tolerances on the error of one step, per component of q, v and the effects' own states
         step : s
             Of one-size steps; the first step of the others, chosen if left out.
@@ -422,6 +424,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
     def __reduce__(self):
         return _again, (type(self), self._model, list((name, effect, on) for name, (effect, on) in self._entries.items()), self._how), {
             "_run_options": self._run_options, "_gravity_said": self._gravity_said, "_limits_said": self._limits_said,
+            "_stiffness_said": self._stiffness_said,
         }  # fmt: skip
 
 

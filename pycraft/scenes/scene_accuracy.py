@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..accuracy.checked_options import (
     checked_seconds,
 )
 from ..accuracy.rungs import Rung, epsilon, precision_name
+from ..accuracy.tables.confirmation import SECOND, about, confirmation, own_error
 from ..accuracy.tables.work_precision import (
     STEPS,
     TOLERANCES,
@@ -31,12 +33,12 @@ from ..dynamics.integrator_names import integrator_names, takes_one_size
 from ..state import at_state
 from .measuring import effects_on, having_on, mark_front, sampled_times, timed_run
 
-INTEGRATORS = ("dopri5", "fehlberg78", "rkmk4")
+INTEGRATORS = ("dopri5", "dop853", "rkmk4")
 PRECISIONS = ("double", "extended")
 REFINEMENTS = ((0, "same"), (1, "wider"))
-REFERENCE = ("fehlberg78", 1e-16)
+REFERENCE = ("dop853", 1e-16)
 """By which the reference is found, in extended precision: the integrator of high order and its tolerance."""
-FINE = ("fehlberg78", 50.0)
+FINE = ("dop853", 50.0)
 """By which forms, refinements and precisions are told apart: the integrator, and its tolerance over the precision's rounding."""
 USUAL = ("dopri5", "rosenbrock4")
 """The integrators of scenes that lack an effect: the first that fits."""
@@ -121,8 +123,12 @@ def accuracy(
     tell("reference")
     wide = _as(_at_states(scene), (*scene._how[:3], "extended"))
     tolerance = REFERENCE[1]
-    truth, looser = (_by(wide, times, q, v)(REFERENCE[0], rtol=r, atol=r)[0] for r in (tolerance, 100 * tolerance))
-    own = trajectory_error(model, truth, looser)
+    run = _by(wide, times, q, v)
+    truth, looser = (run(REFERENCE[0], rtol=r, atol=r)[0] for r in (tolerance, 100 * tolerance))
+    found = confirmation(
+        truth, lambda: run(SECOND, rtol=tolerance, atol=tolerance)[0], partial(trajectory_error, model), f"{SECOND} in extended precision"
+    )
+    own = own_error(trajectory_error(model, truth, looser), found)
     rows = []
     for way, other, integrator, options in ways:
         tell(f"{way['varied']}: {', '.join(map(str, (integrator, *options.values())))}")
@@ -133,7 +139,7 @@ def accuracy(
         rows,
         {
             "model": model.name, "nv": model.nv, "T": length, "reference": f"{REFERENCE[0]} in extended precision, tolerance {tolerance:g}",
-            "reference_error": own, "q": np.asarray(q).tolist(), "v": np.asarray(v).tolist(), "effects": effects_on(scene),
+            "reference_error": own, **about(found), "q": np.asarray(q).tolist(), "v": np.asarray(v).tolist(), "effects": effects_on(scene),
         },
     )  # fmt: skip
 

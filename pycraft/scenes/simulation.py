@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..dynamics.integrator_names import IntegratorName, integrator_named
 from ..progress_bar import RunProgress
 from ..state import at_state
 from .checkpoint import Checkpoint, coordinates_of
+from .doubtful_runs import warn_of_doubts, warn_of_stiffness
 from .events import Event, events_for_core, listed_events
 from .run import Run
 from .runs_on_disk import checked_output
@@ -76,6 +78,7 @@ def simulate(
     q, v = at_state(scene.model, q, v)
     run = _run(scene, options, times, keep, t_eval, events, progress, dense, output, q, v, None)
     scene._warn_of_limits(run)
+    warn_of_doubts(scene, run)
     return run
 
 
@@ -116,6 +119,7 @@ def resume(scene: Any, checkpoint: Any, T: Any, *, t_eval: Any, events: Any, pro
     zero = scene.model.zero_q(), np.zeros(scene.model.nv)  # the state is the checkpoint's
     run = _run(scene, options, times, keep, t_eval, events, progress, dense, output, *zero, checkpoint.state)
     scene._warn_of_limits(run)
+    warn_of_doubts(scene, run)
     return run
 
 
@@ -144,6 +148,7 @@ def _run(
             _core.run_scene(
                 calls, record, q, v, times, [*states], options.energy, chosen.name, *tolerances, options.step, options.max_step,
                 options.normalise, events_for_core(scene.model, wanted), bar if progress else None, checkpoint, solver,
+                partial(warn_of_stiffness, scene, chosen.name),
             )  # fmt: skip
         except (Exception, KeyboardInterrupt) as error:
             if len(record.samples["t"]):
@@ -177,6 +182,8 @@ def _found(scene: Any, calls: Any, record: Any, options: RunOptions, keep: slice
         record.raise_error()
     except Exception as error:
         return error
+    if record.stiffness is not None:
+        warn_of_stiffness(scene, options.integrator.name, record.stiffness)
     return Run.of_record(scene, calls, record, options, [], keep)
 
 

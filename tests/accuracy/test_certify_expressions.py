@@ -168,3 +168,18 @@ def test_methods(panda):
     assert panda.certify(q, tau=np.ones(7), refine=1).rung == Rung(refine=1)
     assert panda.soa.M.certify(q).error < 1e-15 and panda.soa.M.trace().certify(q).error < 1e-15
     assert certify.certify_dynamics.__doc__ and panda.certify.__doc__
+
+
+def test_expressions_of_loops_beside_the_trees_letters():
+    """The compliance of loops: rows of loops have no sweep of their own, the tree has, and its D(k) are located."""
+    model = pc.chain(3)
+    model.add_loop("body2", hinge="ball", point=(1, 0, 0), position=(0.5, 0.5, 0))
+    soa, q = model.soa, np.array([0.1, 0.4, -0.7])
+    Q, MM, I = soa("Q MM I")
+    for op in (Q @ MM.inv() @ Q.T, Q @ (MM + soa.J).inv(), MM.inv() @ Q.T):
+        certificate = op.certify(q)
+        assert certificate.error < 1e-13 and len(certificate.locator) == 3
+    assert not (Q @ Q.T).certify(q).locator
+    trace = (Q @ MM.inv() @ Q.T).trace().certify(q)
+    assert trace.error < 1e-13 and len(trace.locator) == 3
+    assert (I + Q.T @ Q).inv().certify(q).error < 1e-13

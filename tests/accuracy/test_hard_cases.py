@@ -3,6 +3,7 @@
 The full run, 200 instances and a million steps with the installed packages side by side, is `pycraft stability`.
 """
 
+import numpy as np
 import pytest
 
 from pycraft.accuracy.hard_cases import stability
@@ -23,3 +24,18 @@ def test_every_bound_holds(case):
     results = stability.run(SEEDS, STEPS, cases=[case], peers=False)
     assert len(results) >= 1
     assert not results.failures, [(row["method"], row["failed"], row["text"]) for row in results.failures]
+
+
+def test_references_by_hand_are_confirmed_by_a_second_method(monkeypatch):
+    """Two methods of other families agree on the motion of a pendulum; of a motion that they do not agree on there is no reference."""
+    pytest.importorskip("scipy")
+    from pycraft.accuracy.hard_cases import cases_closures
+
+    def rates(t, x):
+        return np.array([x[1], -np.sin(x[0])])
+
+    end = cases_closures._run(rates, np.array([1.0, 0.0]), 2.0)
+    assert abs(0.5 * end[1] ** 2 - np.cos(end[0]) + np.cos(1.0)) < 1e-11
+    monkeypatch.setattr(cases_closures, "CONFIRMED", 1e-15)
+    with pytest.raises(RuntimeError, match="the reference is not confirmed: DOP853 and LSODA differ by"):
+        cases_closures._run(rates, np.array([1.0, 0.0]), 2.0)

@@ -171,7 +171,7 @@ def test_every_row_refused():
 def test_the_table_of_integrators_says_what_was_integrated():
     result = runner.invoke(app, "accuracy panda --integration --seconds 0 --method dopri5 --duration 0.05 --seed 3".split())
     assert result.exit_code == 0, result.output
-    for words in ("0.05 s, gravity (0, 0, -9.81) m/s²", "of seed 3, at rest", "reference: fehlberg78", "the model has no gravity"):
+    for words in ("0.05 s, gravity (0, 0, -9.81) m/s²", "of seed 3, at rest", "reference: dop853", "the model has no gravity"):
         assert words in result.output
 
 

@@ -5,6 +5,7 @@ import pytest
 
 import pycraft as pc
 from pycraft.compiled.expressions import ExpressionGraph
+from support.closed_models import closed_four_bar
 from support.graphs import evaluated
 
 EPS = np.finfo(float).eps
@@ -190,3 +191,43 @@ def test_what_cannot_be_compiled():
         ExpressionGraph(one.soa.MM.trace() + other.soa.MM.trace(), "apply")
     with pytest.raises(pc.EvaluationError, match="operations"):
         pc.chain(60).soa.X_world.compile("dense")
+
+
+def test_letters_known_at_one_state_alone_are_refused_by_name():
+    """Ruling 36: code is a function of the state. These would keep their values at the model's present one."""
+    model, bars = pc.chain(4), closed_four_bar()
+    grouped, free, loops = model.soa.grouped([["body1", "body2"]]), model.soa.free(["hinge1"]), bars.soa.embedded(["crank"])
+    for op, what in (
+        (grouped.MM, "grouped bodies"),
+        (model.soa.MM + grouped.MM, "grouped bodies"),
+        (grouped.MM.logdet() + model.soa.MM.trace(), "grouped bodies"),
+        (free.MM, "free or of prescribed"),
+        (free.Schur_complement, "free or of prescribed"),
+        (model.soa.prescribed(["hinge1"]).D.trace(), "free or of prescribed"),
+        (loops.MM, "embedded loops"),
+        (loops.X_r, "embedded loops"),
+    ):
+        with pytest.raises(pc.EvaluationError, match=f"compile\\(\\) cannot record .*{what}.*at\\(q\\)"):
+            op.compile()
+    for op in (bars.soa.Q, bars.soa.Q @ bars.soa.MM.inv() @ bars.soa.Q.T):
+        with pytest.raises(pc.EvaluationError, match="no recursion is written for Q, rows of loops"):
+            op.compile()
+
+
+def test_letters_known_at_one_state_are_compiled_there():
+    model = pc.chain(4)
+    q = model.random_state(3).q
+    for soa in (model.soa.grouped([["body1", "body2"]]), model.soa.free(["hinge1"])):
+        fixed = soa.MM.at(q)
+        model.q = model.random_state(5).q
+        assert soa.MM.at(q).compile().arguments == ("x",)
+        x = np.ones(soa.Theta.dimension)
+        np.testing.assert_allclose(fixed.compile()(x), fixed @ x, rtol=1e-13)
+
+
+def test_trees_of_given_blocks_do_not_move():
+    rng = np.random.default_rng(0)
+    tree = pc.sko_model([-1, 0], [None, rng.normal(size=(3, 3))], [rng.normal(size=(1, 3))] * 2, [np.eye(3)] * 2)
+    MM = tree.H @ tree.phi @ tree.M @ tree.phi.T @ tree.H.T
+    x = np.ones(2)
+    np.testing.assert_allclose(MM.compile()(x), MM @ x, rtol=1e-13)

@@ -5,7 +5,7 @@ import pytest
 
 import pycraft as pc
 
-CONTROLLED = ["dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer"]
+CONTROLLED = ["dopri5", "cash-karp54", "dop853", "bulirsch-stoer"]
 
 
 @pytest.fixture(scope="module")

@@ -105,9 +105,7 @@ def test_each_run_has_the_bits_it_has_alone(name, integrator):
     assert found["in_packs"].sum() > 0.7 * found["evaluations"].sum()  # lanes that are left at the end are alone
 
 
-@pytest.mark.parametrize(
-    "integrator", ["cash-karp54", "fehlberg78", "bulirsch-stoer", "rosenbrock4", "rkmk4", "semi-implicit-euler", "dopri5"]
-)
+@pytest.mark.parametrize("integrator", ["cash-karp54", "dop853", "bulirsch-stoer", "rosenbrock4", "rkmk4", "semi-implicit-euler", "dopri5"])
 @pytest.mark.parametrize("count", [1, 2, WIDTH - 1, WIDTH + 1])
 def test_every_integrator_and_odd_counts(integrator, count):
     scene = scene_of("springs").add(E.Damping(0.2))

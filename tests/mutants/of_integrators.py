@@ -34,6 +34,20 @@ CHANGES = {
         ("dense output begins at the step's end", "t_from_ = t, t_to_ = t + h;", "t_from_ = t + h, t_to_ = t + h;", STATEMENT),
         ("a first rate counts twice", "{1, r(1, 3)}, {2, r(1, 3)}", "{0, r(1, 3)}, {2, r(1, 3)}"),
     ],
+    "cpp/simulation/integrators/dormand_prince_8.h": [
+        ("an estimate of order 8 is blind", "return five > 0 ? five / std::hypot(1.0, 0.1 * three / five) : 0;", "return 0;", STATEMENT),
+        ("dense output takes the stages of a step for its own", "stages_.up_to(judged + 4);", ";", STATEMENT),
+        ("the rate at a step's end is forgotten", "if (ended_) stages_.k(0).swap(stages_.k(judged));", ";", STATEMENT),
+    ],
+    "cpp/simulation/integrators/switching_steps.cpp": [
+        ("a stiff motion never ends", "if (calm >= looks) change(t, x, step);", ";", STATEMENT),
+        ("every step at the bound is stiff", "holds(std::abs(step))", "holds(std::abs(step)) && false"),
+        ("counts are lost in a checkpoint", "steps_[0]->resume_counts(counted_);", ";", STATEMENT),
+    ],
+    "cpp/simulation/decay.cpp": [
+        ("what turns is not turned", "to_u[at + i] += turned[i] / 2;", ";", STATEMENT),
+        ("forces do not follow displacements", "right_.noalias() = linear_.along_u * u;", "right_.setZero(z.size());", STATEMENT),
+    ],
     "cpp/simulation/integrators/variational.h": [
         ("momenta are not carried along", "for (int i = 0; i < n_; ++i) r_[i] += half * part_[i];", ";", STATEMENT),
         ("forces act half", "part_[i] = P_[i] + h * F_[i]", "part_[i] = P_[i] + h / S(2) * F_[i]"),

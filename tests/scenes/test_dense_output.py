@@ -11,15 +11,15 @@ from support.runs import CASES, CONTROLLED, FIXED
 E = pc.effects
 
 
-def errors_between(scene, integrator, counts, T=0.4):
-    """Of q and of v between the ends of equal steps, the steps' own errors taken off: against steps that end there."""
+def errors_between(scene, integrator, counts, T=0.4, pickled=False):
+    """Of q and of v between the ends of equal steps, against steps that end there; pickled: by Hermite's interpolation."""
     times = (np.arange(97) + 0.37) / 97 * T  # anywhere in steps
     found = []
     for n in counts:
         options = {"integrator": integrator, "step": T / n} | ({} if integrator in FIXED else {"rtol": 1e6, "atol": 1e6, "max_step": T / n})
         run = scene.simulate(T, energy=False, **options)
-        best = scene.simulate(T, integrator="fehlberg78", rtol=1e-13, atol=1e-14, t_eval=times, energy=False)
-        at = run.at(times)
+        best = scene.simulate(T, integrator="dop853", rtol=1e-13, atol=1e-14, t_eval=times, energy=False)
+        at = (pickle.loads(pickle.dumps(run)) if pickled else run).at(times)
         q = max(np.abs(scene.model.difference(a, b)).max() for a, b in zip(at.q, best.q, strict=True))
         found.append((q, np.abs(at.v - best.v).max()))
     return np.array(found)
@@ -27,10 +27,18 @@ def errors_between(scene, integrator, counts, T=0.4):
 
 @pytest.mark.parametrize("case", ["double pendulum", "spinning"])
 def test_hermites_order(case):
-    """fehlberg78's own error is far below: what is left is O(h⁶) in q and O(h⁵) in v, of a step of size h."""
-    found = errors_between(CASES[case](), "fehlberg78", (4, 8, 16))
+    """The error of dop853's steps is far below: what is left is O(h⁶) in q and O(h⁵) in v, of a step of size h."""
+    found = errors_between(CASES[case](), "dop853", (4, 8, 16), pickled=True)
     orders = np.log2(found[:-1] / found[1:])
     assert abs(orders[-1, 0] - 6) < 0.5 and abs(orders[-1, 1] - 5) < 0.5, (found, orders)
+
+
+@pytest.mark.parametrize("case", ["double pendulum", "spinning"])
+def test_the_order_of_the_dense_output_of_dop853(case):
+    """It is a polynomial of degree 7 with local errors O(h⁸), as those of the steps add up to."""
+    found = errors_between(CASES[case](), "dop853", (8, 16, 32) if case == "double pendulum" else (2, 4, 8))
+    orders = np.log2(found[:-1] / found[1:])
+    assert (orders[-1] > 7).all() and found[-1].max() < 1e-9, (found, orders)
 
 
 @pytest.mark.parametrize("case", ["double pendulum", "spinning"])
@@ -53,7 +61,7 @@ def test_times_asked_for_change_no_step(integrator):
     times = np.linspace(0.03, 0.47, 12)
     plain, asked = scene.simulate(0.5, **options), scene.simulate(0.5, t_eval=times, **options)
     assert np.array_equal(asked.t, times)
-    ends_there = integrator in ("fehlberg78", "bulirsch-stoer")
+    ends_there = integrator == "bulirsch-stoer"
     assert (asked.statistics["steps"] != plain.statistics["steps"]) == ends_there
     at = (asked if ends_there else plain).at(times)
     if integrator.startswith("scipy:"):  # after the run by Hermite's
@@ -61,7 +69,7 @@ def test_times_asked_for_change_no_step(integrator):
     else:
         assert np.abs(at.q - asked.q).max() < 1e-14 and np.abs(at.v - asked.v).max() < 1e-13
         assert np.abs(at.energy["work"] - asked.energy["work"]).max() < 1e-13
-    assert np.abs(asked.q - scene.simulate(0.5, integrator="fehlberg78", t_eval=times).q).max() < (
+    assert np.abs(asked.q - scene.simulate(0.5, integrator="dop853", t_eval=times).q).max() < (
         0.05 if integrator == "semi-implicit-euler" else 1e-3
     )
 
@@ -120,7 +128,7 @@ def test_what_is_not_there():
 def test_works_between_steps_follow_their_powers(integrator):
     """Errors of works fall with the fourth power of the step at least; straight lines would leave the second."""
     scene, times = CASES["damped"](), (np.arange(41) + 0.37) / 41 * 0.4
-    best = scene.simulate(0.4, integrator="fehlberg78", rtol=1e-13, atol=1e-14, t_eval=times).energy["work"]
+    best = scene.simulate(0.4, integrator="dop853", rtol=1e-13, atol=1e-14, t_eval=times).energy["work"]
     found = []
     for n in (10, 20, 40):
         run = scene.simulate(

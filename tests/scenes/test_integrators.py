@@ -12,7 +12,7 @@ E = pc.effects
 
 def test_the_table_is_of_all_integrators():
     table = {row["name"]: row for row in _core.integrator_table()}
-    assert list(table) == _core.integrators() and set(table) == {*CONTROLLED, *FIXED}
+    assert list(table) == _core.integrators() and set(table) == {*CONTROLLED, *FIXED, "auto"}
     assert {name for name, row in table.items() if not row["controlled"]} == set(FIXED)
     assert all(table[name]["order"] == order for name, order in FIXED.items())
 
@@ -34,12 +34,12 @@ def test_orders_of_steps_of_one_size(integrator, case):
 
 
 @pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("integrator, order", [("dopri5", 5), ("cash-karp54", 5), ("fehlberg78", 8), ("rosenbrock4", 4)])
+@pytest.mark.parametrize("integrator, order", [("dopri5", 5), ("cash-karp54", 5), ("dop853", 8), ("rosenbrock4", 4)])
 def test_orders_of_controlled_steps(integrator, order, case):
     """The same with steps that the tolerance leaves alone: all of one size."""
     T = 0.5
     scene, end = CASES[case](), exact(case, T)
-    counts = (2, 4, 8) if order == 8 else (32, 64, 128)
+    counts = (32, 64, 128) if order < 8 else (8, 16, 32) if case == "double pendulum" else (2, 4, 8)
     errors = []
     for n in counts:
         run = scene.simulate(T, integrator=integrator, rtol=1e3, atol=1e3, step=T / n, max_step=T / n, energy=False)
@@ -63,7 +63,7 @@ def test_tolerances_are_followed(integrator):
 
 def test_short_names():
     scene = pc.mechanisms.pendulum()
-    for short, full in {"dop853": "scipy:DOP853", "RK45": "scipy:RK45", "lsoda": "scipy:LSODA"}.items():
+    for short, full in {"DOP853": "scipy:DOP853", "RK45": "scipy:RK45", "lsoda": "scipy:LSODA", "dop853": "dop853"}.items():
         runs = [scene.simulate(0.3, integrator=name, t_eval=[0.1, 0.3]) for name in (short, full)]
         assert np.array_equal(runs[0].q, runs[1].q) and runs[0].checkpoint().integrator == full
 
@@ -90,7 +90,7 @@ def test_the_period_to_all_its_digits():
     """At rest again, falling with 9.81 rad/s²: half a unit of the last digit."""
     scene = pc.mechanisms.pendulum()
     wide = pc.Scene(scene.model, precision="extended").add(E.Gravity())
-    run = wide.simulate(2.367841947576, integrator="fehlberg78", rtol=1e-16, atol=1e-16)
+    run = wide.simulate(2.367841947576, integrator="dop853", rtol=1e-16, atol=1e-16)
     assert abs(run.v[-1, 0]) / 9.81 <= 5e-13 + 1e-14
 
 
@@ -143,7 +143,7 @@ def test_an_oscillator_damped_and_driven(integrator):
     assert np.abs(run.q[:, 0] - solution).max() < 1e-7
 
 
-@pytest.mark.parametrize("integrator", ["fehlberg78", "dopri5", "rosenbrock4", "rkmk4", "variational4", "scipy:DOP853"])
+@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "rosenbrock4", "rkmk4", "variational4", "scipy:DOP853"])
 def test_the_heavy_top(integrator):
     """Energy and the place of the centre of mass after 1 s as published (Brüls and Cardona 2010), ten digits."""
     options = {"step": 1e-4} if integrator in FIXED else {"rtol": 1e-9 if integrator == "rosenbrock4" else 1e-11, "atol": 1e-11}
@@ -160,4 +160,4 @@ def test_the_balance_of_energy_is_the_integrators_error(integrator):
     settings = [{"step": h} for h in (0.02, 0.005)] if integrator in FIXED else [{"rtol": r, "atol": r} for r in (1e-5, 1e-8)]
     spread = [np.ptp(scene.simulate(0.5, integrator=integrator, **one).balance) for one in settings]
     better = 4.0 ** FIXED[integrator] if integrator in FIXED else 1000
-    assert spread[1] < spread[0] / (0.3 * better) + 1e-12 and spread[1] < 1e-3, spread
+    assert spread[1] < spread[0] / (0.15 * better) + 1e-12 and spread[1] < 1e-3, spread

@@ -210,7 +210,7 @@ def test_both_methods_lead_to_one_motion(name):
     """States, accelerations at them and what the loops put on coordinates; multipliers where none hangs on others."""
     make, T = MOTIONS[name]
     scenes = [make(method) for method in METHODS]
-    runs = [scene.simulate(T, integrator="fehlberg78", rtol=1e-11, atol=1e-12, progress=False) for scene in scenes]
+    runs = [scene.simulate(T, integrator="dop853", rtol=1e-11, atol=1e-12, progress=False) for scene in scenes]
     model, state = scenes[0].model, runs[0]
     way = np.abs(model.difference(runs[0].q[-1], runs[1].q[-1])).max()
     assert way < 1e-8 * max(1.0, np.abs(runs[0].q[-1]).max())  # a thousand tolerances of steps

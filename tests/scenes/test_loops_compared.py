@@ -31,14 +31,14 @@ def table():
 def test_rows(table):
     ways = list(dict.fromkeys((row["method"], row["integrator"]) for row in table))
     assert ways == [
-        ("augment", "dopri5"), ("augment", "fehlberg78"), ("embed", "dopri5"), ("embed", "fehlberg78"), ("penalty", "dopri5"),
+        ("augment", "dopri5"), ("augment", "dop853"), ("embed", "dopri5"), ("embed", "dop853"), ("penalty", "dopri5"),
         ("penalty", "rosenbrock4"),
     ]  # fmt: skip
     assert len(table) == 12 and isinstance(table, WorkPrecisionTable) and not any(row["refused"] for row in table)
     assert all(row["seconds"] > 0 and row["evaluations"] > 0 for row in table)
     assert all((row["frequency"] is None) == (row["method"] != "penalty") for row in table)
     assert table.about["loops"] == ["wrist"] and table.about["rows"] == 5
-    assert table.reference == "augment by fehlberg78 in extended precision, tolerance 1e-13" and table.reference_error < 1e-10
+    assert table.reference == "augment by dop853 in extended precision, tolerance 1e-13" and table.reference_error < 1e-10
 
 
 def test_what_is_kept_is_on_its_rows_and_springs_are_off_them(table):
@@ -166,7 +166,7 @@ def test_table_and_files(table, monkeypatch, tmp_path):
     assert "Pareto front" in repr(table)
     monkeypatch.setenv("COLUMNS", "80")
     lines = repr(table).split("\n")
-    assert max(map(len, lines)) <= 80 and "* Pareto front" in lines[-1]
+    assert max(map(len, lines)) <= 80 and any("* Pareto front" in line for line in lines[-4:])
     table.to_csv(tmp_path / "loops.csv")
     assert (tmp_path / "loops.csv").read_text().splitlines()[0].split(",") == list(table.columns)
 

@@ -6,7 +6,7 @@ import pytest
 import pycraft as pc
 
 E = pc.effects
-TIGHT = dict(integrator="fehlberg78", rtol=1e-12, atol=1e-14)
+TIGHT = dict(integrator="dop853", rtol=1e-12, atol=1e-14)
 
 
 def slider(mass=1.0, axis=(1, 0, 0)):

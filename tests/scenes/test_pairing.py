@@ -7,7 +7,7 @@ import pycraft as pc
 from support.runs import CONTROLLED, FIXED, SCIPY
 
 E = pc.effects
-EXPLICIT = ["dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rk4", "rkmk4"]
+EXPLICIT = ["dopri5", "cash-karp54", "dop853", "bulirsch-stoer", "rk4", "rkmk4"]
 BY_MOMENTA = ["variational2", "variational4"]
 
 

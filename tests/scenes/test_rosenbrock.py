@@ -97,7 +97,7 @@ def test_every_effect_keeps_the_order(model, name):
     if name == "implicit":
         of = single(model)
         plain = pc.Scene(model).add(E.Damping(0.5), E.Spring(4.0, rest=0.1, hinges=of))
-    best = plain.simulate(T, state.q, state.v, integrator="fehlberg78", rtol=1e-12, atol=1e-13, energy=False)
+    best = plain.simulate(T, state.q, state.v, integrator="dop853", rtol=1e-12, atol=1e-13, energy=False)
     errors = []
     for n in (10, 20, 40):
         run = scene.simulate(T, state.q, state.v, integrator="rosenbrock4", rtol=1e4, atol=1e4, step=T / n, max_step=T / n, energy=False)
@@ -116,7 +116,7 @@ def test_dense_output_of_its_own():
     """Order 3: errors between the ends of steps of size h are O(h⁴)."""
     scene = spinning()
     times = np.linspace(0.01, 0.49, 25)
-    best = scene.simulate(0.5, integrator="fehlberg78", rtol=1e-13, atol=1e-14, t_eval=times)
+    best = scene.simulate(0.5, integrator="dop853", rtol=1e-13, atol=1e-14, t_eval=times)
     errors = []
     for n in (10, 20, 40):
         run = scene.simulate(0.5, integrator="rosenbrock4", rtol=1e4, atol=1e4, step=0.5 / n, max_step=0.5 / n, t_eval=times)

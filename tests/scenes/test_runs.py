@@ -181,9 +181,9 @@ def test_progress_is_shown_in_a_terminal(monkeypatch, capsys):
         (dict(t_eval=[0.5, 2.0]), "t_eval goes from 0.5 to 2 s; the run goes from 0 to T = 1 s"),
         (dict(rtol=1e-20, atol=1e-20), "rtol=1e-20 and atol=1e-20 are below what the precision holds"),
         (dict(atol=0.0), "atol is positive"),
-        (dict(rtol=np.nan, integrator="dop853"), "rtol=nan: a tolerance is a positive number"),
+        (dict(rtol=np.nan, integrator="DOP853"), "rtol=nan: a tolerance is a positive number"),
         (dict(normalise="always"), "normalise='always': there are 'never' and 'each step'"),
-        (dict(normalise="each step", integrator="dop853"), "integrator 'scipy:DOP853' has no normalise='each step'"),
+        (dict(normalise="each step", integrator="DOP853"), "integrator 'scipy:DOP853' has no normalise='each step'"),
         (dict(output="run.txt"), r"output 'run.txt': a run is written to a file that ends in .nc, .parquet, .csv"),
     ],
 )

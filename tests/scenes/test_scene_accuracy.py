@@ -35,7 +35,7 @@ def test_rows_by_what_is_varied(table):
     ways = [(row["varied"], table.label(row)) for row in table]
     assert ways == [
         ("integrator", "dopri5 at 1e-04"), ("integrator", "dopri5 at 1e-08"),
-        ("integrator", "fehlberg78 at 1e-04"), ("integrator", "fehlberg78 at 1e-08"),
+        ("integrator", "dop853 at 1e-04"), ("integrator", "dop853 at 1e-08"),
         ("integrator", "rkmk4 at 0.02 s"), ("integrator", "rkmk4 at 0.01 s"),
         *(("arithmetic", form + way) for form in ("fast", "ud", "square-root") for way in ("", " + 1 refinement, wider residual")),
         ("arithmetic", "fast, extended"),
@@ -84,7 +84,7 @@ def test_forms_of_the_scene_itself(pendulum):
         ("integrator", "ud", 1, "double"), ("arithmetic", "fast", 0, "double"), ("arithmetic", "ud", 1, "extended"),
         ("effects", "ud", 1, "double"),
     ]  # fmt: skip
-    assert table.about["reference"] == "fehlberg78 in extended precision, tolerance 1e-16"
+    assert table.about["reference"] == "dop853 in extended precision, tolerance 1e-16"
 
 
 def test_what_does_not_run_is_refused(pendulum):
@@ -121,7 +121,7 @@ def test_picture(table):
     crosses = [(line.get_xdata()[0], line.get_ydata()[0]) for line in axes.lines if line.get_marker() == "x"]
     assert crosses == [(row["seconds"], row["error"]) for row in table if row["varied"] == "effects"]
     legend = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert legend[:3] == ["dopri5", "fehlberg78", "rkmk4"] and "extended" in legend and "Pareto front" in legend
+    assert legend[:3] == ["dopri5", "dop853", "rkmk4"] and "extended" in legend and "Pareto front" in legend
     empty = SceneAccuracyTable("Nothing", [], {"reference_error": 0.0}).plot()
     assert "there are no rows" in empty.texts[0].get_text()
 

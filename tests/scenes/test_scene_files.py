@@ -90,7 +90,7 @@ def test_a_whole_scene(arm, tmp_path):
     for name, made in EVERY.items():
         scene.add(made(), name=f'the {name.lower()} "it" has')
     scene.add(E.Damping(0.3, hinges=arm.hinges["panda_joint6"]), E.Gravity()).disable("gravity", 'the fixman "it" has')
-    scene.run_options = {"T": 2.5, "integrator": "fehlberg78", "rtol": 1e-10, "every": 0.1}
+    scene.run_options = {"T": 2.5, "integrator": "dop853", "rtol": 1e-10, "every": 0.1}
     scene.save(tmp_path / "named.toml", model="panda")
     same_numbers(scene, pc.load_scene(tmp_path / "named.toml"))
     scene.save(tmp_path / "whole.toml")

@@ -149,6 +149,6 @@ def test_effects_with_states_and_controllers():
     arm = pc.chain(2)
     scene = pc.Scene(arm).add(E.Gravity((0, -9.81, 0)), Lag(), E.Sampled(lambda t, s: -0.5 * s.v, 0.1))
     start = ([0.3, 0.2], [0.5, 0.1])
-    best = scene.simulate(0.5, *start, integrator="fehlberg78", rtol=1e-11, atol=1e-13)
+    best = scene.simulate(0.5, *start, integrator="dop853", rtol=1e-11, atol=1e-13)
     errors = [np.abs(scene.simulate(0.5, *start, integrator="variational2", step=h).q[-1] - best.q[-1]).max() for h in (0.02, 0.01, 0.005)]
     assert np.abs(np.log2(np.array(errors[:-1]) / errors[1:]) - 2).max() < 0.3

@@ -7,7 +7,7 @@ import numpy as np
 import pycraft as pc
 
 E = pc.effects
-CONTROLLED = ["dopri5", "cash-karp54", "fehlberg78", "bulirsch-stoer", "rosenbrock4"]
+CONTROLLED = ["dopri5", "cash-karp54", "dop853", "bulirsch-stoer", "rosenbrock4"]
 FIXED = {"rk4": 4, "rkmk4": 4, "semi-implicit-euler": 1, "variational2": 2, "variational4": 4}
 """Of steps of one size, with their orders."""
 SCIPY = ["scipy:RK45", "scipy:DOP853", "scipy:Radau", "scipy:BDF", "scipy:LSODA"]
@@ -36,7 +36,7 @@ def exact(case, T):
     """The last state of a case after T seconds, sixteen digits."""
     scene = CASES[case]()
     wide = pc.Scene(scene.model, precision="extended").add(*scene.effects.values())
-    run = wide.simulate(T, integrator="fehlberg78", rtol=1e-16, atol=1e-17, t_eval=[T], progress=False)
+    run = wide.simulate(T, integrator="dop853", rtol=1e-16, atol=1e-17, t_eval=[T], progress=False)
     return run.q[-1], run.v[-1]
 
 

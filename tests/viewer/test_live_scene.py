@@ -44,12 +44,12 @@ def test_pieces_are_the_run(seed):
     np.testing.assert_allclose(live.along()["vdot"], scene.evaluate(live.q, live.v, live.t).vdot, rtol=1e-12)
 
 
-@pytest.mark.parametrize("integrator", ["rk4", "rkmk4", "fehlberg78", "rosenbrock4", "semi-implicit-euler", "variational2", "dop853"])
+@pytest.mark.parametrize("integrator", ["rk4", "rkmk4", "dop853", "rosenbrock4", "semi-implicit-euler", "variational2", "scipy:DOP853"])
 def test_a_scene_goes_on_as_its_options_say(integrator):
     model = pc.tree([-1, 0], ["ball", "pin"])
     state = model.random_state(1)
     scene = pc.Scene(model).add(pc.effects.Gravity(g=(0, 0, -9.81)))
-    stepped = integrator not in ("fehlberg78", "rosenbrock4", "dop853")
+    stepped = integrator not in ("dop853", "rosenbrock4", "scipy:DOP853")
     scene.run_options = {"T": 3.0, "integrator": integrator, **({"step": 1e-3} if stepped else {"rtol": 1e-8})}
     live = LiveScene(scene, state.q, 0.1 * state.v)
     for _ in range(6):
@@ -58,7 +58,7 @@ def test_a_scene_goes_on_as_its_options_say(integrator):
     # Of the first order method half a step times the acceleration; of the others what is left of 1e-3 squared.
     np.testing.assert_allclose(model.difference(run.q[-1], live.q), 0, atol=5e-3 if "euler" in integrator else 1e-4)
     assert np.linalg.norm(live.q[:4]) == pytest.approx(1, abs=1e-9)
-    assert live.options.integrator.name.lower().endswith(integrator)
+    assert live.options.integrator.name == integrator
 
 
 def test_time_goes_on():

@@ -141,7 +141,7 @@ def sensitivities():
 def a_trajectory():
     model = pc.chain(6, seed=1)
     state = model.random_state(0)
-    return lambda: model.integrate_ode(state.q, state.v, [0.0, 1000.0], integrator="fehlberg78", rtol=1e-13, precision="quad")
+    return lambda: model.integrate_ode(state.q, state.v, [0.0, 1000.0], integrator="dop853", rtol=1e-13, precision="quad")
 
 
 def an_operator_from_outside():

@@ -117,6 +117,9 @@ void Workspace<S>::blocks_of_dense(const Step& s, const std::vector<SkoValues<S>
 
 template <class S>
 void Workspace<S>::factor_block(const BlockStorage<S>& b, int k, const Space& space) {
+  if (b.rows[k] != b.columns[k])
+    throw EvaluationError("block " + std::to_string(k) + " of " + plan_->text + " has " + std::to_string(b.rows[k]) + " x " + std::to_string(b.columns[k]) +
+                          " entries: it is not square and cannot be factored");
   block_.assign(b.at(k), b.at(k) + size_t(b.rows[k]) * b.columns[k]);
   if (!lu_.factor(block_.data(), b.rows[k], nullptr))
     throw SingularOperatorError("block '" + space.layout().blocks[space.layout().of_body[k][0]].label + "' of a block-diagonal operator in " + plan_->text +

@@ -77,7 +77,10 @@ void Workspace<S>::eliminate(const Step& s, const std::vector<SkoValues<S>*>& va
   const auto note = [&](const std::string& text) {
     if (std::find(notes_.begin(), notes_.end(), text) == notes_.end()) notes_.push_back(text);
   };
-  auto& [own, wide] = eliminations_[s.out];
+  Factors& factors = eliminations_[s.out];
+  auto& own = factors.own;
+  auto& wide = factors.wide;
+  ++factors.made;
   if (!own) own = std::make_unique<TreeElimination<S>>(s.realization);
   wide.reset();
   const bool solved = own->factor(blocks, numbers);

@@ -18,14 +18,15 @@ Refinement Workspace<S>::refinement() const {
   return r;
 }
 
-// This plan one scalar up, at the state of these values: everything but the factors, where they serve solves alone.
+// The values of this plan one scalar up, at the state of these.
 template <class S>
 void Workspace<S>::follow(const std::vector<SkoValues<S>*>& values) {
   if (!wide_) wide_ = std::make_unique<Workspace<Wider<S>>>(plan_);
   std::vector<std::uint64_t> now;
   for (const SkoValues<S>* v : values) now.push_back(v->generation());
   if (now == followed_) return;
-  followed_ = now;
+  followed_.clear();  // an error may come before all are there
+  followed_to_ = 0;
   wide_values_.resize(values.size());
   wide_at_.clear();
   for (size_t c = 0; c < values.size(); ++c) {
@@ -45,27 +46,54 @@ void Workspace<S>::follow(const std::vector<SkoValues<S>*>& values) {
     wide_values_[c]->require(plan_->groups[c] | Group::kinematics);
     wide_at_.push_back(wide_values_[c].get());
   }
-  wide_->run_as(*this, wide_at_);
+  wide_->state = state;
+  wide_->values = wide_at_;
+  followed_ = now;
 }
 
+// The steps before this one, in their order and no further: what stands behind it (another factorization, say) is not made in the narrow
+// workspace yet.
+template <class S>
+void Workspace<S>::follow_steps(const Step& until) {
+  const size_t end = size_t(&until - plan_->steps.data());
+  for (const auto& [_, r] : plan_->vectors) convert(numbers(r), size_t(rows(r)), wide_->vectors_[r]);
+  for (; followed_to_ < end; ++followed_to_) wide_->run_as(*this, plan_->steps[followed_to_]);
+}
+
+// Blocks, and what they are made of. Columns that functions of blocks take are computed, those that a solve or somebody else's operator
+// makes are taken over.
 template <class S>
 template <class T>
-void Workspace<S>::run_as(const Workspace<T>& narrow, const std::vector<SkoValues<S>*>& values) {
+void Workspace<S>::run_as(Workspace<T>& narrow, const Step& s) {
+  if (s.out < 0) return;
   PassCounts counts;
-  for (const Step& s : plan_->steps) {
-    if (s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector) continue;
-    const bool solves_only = s.kind == StepKind::factor && std::none_of(plan_->steps.begin(), plan_->steps.end(), [&](const Step& t) {
-      return (t.kind == StepKind::selected_blocks || t.kind == StepKind::logdet_of_factor) && t.in[0] == s.out;
-    });
-    if (!solves_only) {
-      step(s, values, 1, counts);
-      continue;
-    }
-    auto& own = eliminations_[s.out].own;
-    if (!own) own = std::make_unique<TreeElimination<S>>(s.realization);
-    own->assemble_as(*narrow.eliminations_[s.out].own, [&](int r) -> const BlockStorage<S>& { return blocks_[r]; },
-                     [&](int c) -> const SkoValues<S>& { return *values[c]; });
+  const Register& reg = plan_->registers[s.out];
+  const auto read_by_selected = [&](const Step& t) { return t.kind == StepKind::selected_blocks && t.in[0] == s.out; };
+  if (reg.kind == RegisterKind::blocks) return step(s, values, 1, counts);
+  if (reg.kind == RegisterKind::factor && std::any_of(plan_->steps.begin(), plan_->steps.end(), read_by_selected)) return step(s, values, 1, counts);
+  if (reg.kind != RegisterKind::vector || reg.wide || !functions_of_vectors_) return;
+  vectors_[s.out].resize(rows(s.out));
+  switch (s.kind) {
+    case StepKind::solve:
+    case StepKind::mass_matrix_solve:
+    case StepKind::mass_matrix_solve_tangent:
+    case StepKind::dense_solve:
+    case StepKind::apply_external: return convert(narrow.numbers(s.out), size_t(rows(s.out)), vectors_[s.out]);
+    default: return step(s, values, 1, counts);
   }
+}
+
+// The narrower workspace's system of a factorization, its bodies merged as there.
+template <class S>
+template <class T>
+TreeElimination<S>& Workspace<S>::system_as(const Workspace<T>& narrow, int r) {
+  Factors& factors = eliminations_[r];
+  const auto& theirs = narrow.eliminations_[r];
+  if (!factors.system) factors.system = std::make_unique<TreeElimination<S>>(plan_->registers[r].realization);
+  if (factors.system_of != theirs.made)
+    factors.system->assemble_as(*theirs.own, [&](int i) -> const BlockStorage<S>& { return blocks_[i]; }, [&](int c) -> const SkoValues<S>& { return *values[c]; });
+  factors.system_of = theirs.made;
+  return *factors.system;
 }
 
 // Residuals of eliminated systems are formed one scalar up, whatever was asked for: their own rounding is soon all that is left in
@@ -79,7 +107,8 @@ void Workspace<S>::solve_realization(const Step& s, const std::vector<SkoValues<
   if (how.steps == 0 || std::is_same_v<S, Wider<S>> || eliminations_[s.in[0]].wide)
     return with_factors(s.in[0], [&](auto& factors) { factors.solve(x, y, w, blocks, how); });
   follow(values);
-  auto& wide = *wide_->eliminations_[s.in[0]].own;
+  follow_steps(s);
+  auto& wide = wide_->system_as(*this, s.in[0]);
   eliminations_[s.in[0]].own->solve(x, y, w, blocks, how, [&](const S* b, const S* solution, S* r) {
     wide.residual(b, solution, r, w, [&](int i) -> const BlockStorage<Wider<S>>& { return wide_->blocks_[i]; });
   });

@@ -35,7 +35,7 @@ class Workspace {
       if (reg.kind == RegisterKind::blocks) blocks_[r].shape(reg.space, reg.columns);
     }
     for (const Step& s : plan_->steps)
-      functions_of_vectors_ |= s.kind == StepKind::function_blocks && plan_->registers[s.in[0]].kind == RegisterKind::vector;
+      functions_of_vectors_ |= (s.kind == StepKind::function_blocks && plan_->registers[s.in[0]].kind == RegisterKind::vector) || (s.operand && !s.operand->vectors.empty());
     for (const Step& s : plan_->steps)
       if (s.operand) operands_.emplace_back(&s, std::make_unique<Workspace>(s.operand, s.kind == StepKind::dense_factor && !s.flag ? whole_ : nullptr));
   }
@@ -46,10 +46,11 @@ class Workspace {
       const Register& reg = plan_->registers[r];
       if (reg.kind == RegisterKind::vector && !lent_[r]) vectors_[r].resize(size_t(reg.space.dimension()) * (reg.wide ? columns : 1));
     }
+    if (values_changed || functions_of_vectors_) followed_to_ = 0;
     bool worked = false;
     for (const Step& s : plan_->steps) {
       const bool per_column = s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector;
-      // a function of a vector, and what is made of it, may hang on a named vector
+      // a function of a vector, an operand with one in it, and what is made of them, may hang on a named vector
       if (!values_changed && !per_column && !functions_of_vectors_) continue;
       if (worked) check_interrupt();
       step(s, values, columns, counts);
@@ -115,8 +116,11 @@ class Workspace {
   // refined_solves.h
   Refinement refinement() const;
   void follow(const std::vector<SkoValues<S>*>& values);
+  void follow_steps(const Step& until);
   template <class T>
-  void run_as(const Workspace<T>& narrow, const std::vector<SkoValues<S>*>& values);
+  void run_as(Workspace<T>& narrow, const Step& s);
+  template <class T>
+  TreeElimination<S>& system_as(const Workspace<T>& narrow, int r);
   void solve_realization(const Step& s, const std::vector<SkoValues<S>*>& values, int w);
   void solve_mass_matrix(const Step& s, const std::vector<SkoValues<S>*>& values, int w);
   void solve_mass_matrix_tangent(const Step& s, const std::vector<SkoValues<S>*>& values, int w, PassCounts& counts);
@@ -130,16 +134,17 @@ class Workspace {
   }
   template <class F>
   void with_factors(int r, F f) {
-    auto& [own, wide] = eliminations_[r];
+    Factors& factors = eliminations_[r];
     if constexpr (!is_recorded<S>)
-      if (wide) return f(*wide);
-    f(*own);
+      if (factors.wide) return f(*factors.wide);
+    f(*factors.own);
   }
   Workspace& operand_workspace(const Step& s) {
     Workspace* w = nullptr;
     for (auto& [step, workspace] : operands_)
       if (step == &s) w = workspace.get();
     w->state = state;
+    for (const auto& [name, r] : s.operand->vectors) w->vectors_[r] = vectors_[plan_->vectors.at(name)];
     return *w;
   }
   std::vector<SkoValues<S>*> operand_values(const Step& s, const std::vector<SkoValues<S>*>& values) const {
@@ -159,6 +164,9 @@ class Workspace {
   struct Factors {
     std::unique_ptr<TreeElimination<S>> own;
     std::unique_ptr<TreeElimination<Quad>> wide;
+    int made = 0;                                   // how many times
+    std::unique_ptr<TreeElimination<S>> system;     // of a narrower workspace's, not factored: for residuals
+    int system_of = 0;                              // which of those
   };
   std::vector<Factors> eliminations_;
   std::vector<SmallLU<S>> dense_lu_;
@@ -177,7 +185,8 @@ class Workspace {
   std::vector<std::unique_ptr<SkoValues<Wider<S>>>> wide_values_;
   std::vector<SkoValues<Wider<S>>*> wide_at_;
   std::vector<Wider<S>> wide_x_, wide_y_, wide_scratch_;
-  std::vector<std::uint64_t> followed_;
+  std::vector<std::uint64_t> followed_;                   // the values that it is at
+  size_t followed_to_ = 0;                                // steps that it has done there
 
  public:
   std::vector<std::unique_ptr<SkoValues<S>>> own_values;  // of batched contexts

@@ -22,6 +22,16 @@ const Symbol* edge_symbol(const Expression& e, bool& transposed) {
 
 unsigned triangles(const Expression& e);
 
+// f(block of a, block of b) of the blocks that both have at body k, in their order; false where they have not as many.
+template <class F>
+bool over_blocks(const Space& a, const Space& b, size_t k, F f) {
+  const std::vector<int>&of_a = a.layout().of_body[k], &of_b = b.layout().of_body[k];
+  if (of_a.size() != of_b.size()) return false;
+  for (size_t i = 0; i < of_a.size(); ++i)
+    if (!f(a.layout().blocks[of_a[i]], b.layout().blocks[of_b[i]])) return false;
+  return true;
+}
+
 // Blocks over one model's bodies and over another's, of the same coordinates, add up to none over either.
 bool cut_alike(const Expression& sum, const Expression& term) {
   return sum.floating() || term.floating() || (cut_alike(sum.domain(), term.domain()) && cut_alike(sum.codomain(), term.codomain()));
@@ -55,8 +65,9 @@ unsigned triangles_of_node(const Expression& e) {
     case NodeKind::vector:
     case NodeKind::external: return 0;
     case NodeKind::transpose: return flip(triangles(e.children()[0]));
-    case NodeKind::scaled:
-    case NodeKind::inverse: return triangles(e.children()[0]);  // the inverse of a block-triangular operator is so too
+    case NodeKind::scaled: return triangles(e.children()[0]);
+    case NodeKind::inverse:  // of a block-triangular operator: so too, where the blocks on its diagonal are square
+      return e.floating() || cut_equally(e.domain(), e.codomain()) ? triangles(e.children()[0]) : 0u;
     case NodeKind::sum: {
       unsigned t = both;
       for (const Expression& c : e.children()) t &= cut_alike(e, c) ? triangles(c) : 0u;
@@ -105,6 +116,22 @@ unsigned triangles(const Expression& e) {
 bool is_block_diagonal(const Expression& e) { return triangles(e) == both; }
 bool is_upper_triangular(const Expression& e) { return triangles(e) & upper; }
 bool is_lower_triangular(const Expression& e) { return triangles(e) & lower_; }
+
+bool cut_equally(const Space& a, const Space& b) {
+  if (!cut_alike(a, b)) return false;
+  if (a.layout_pointer() == b.layout_pointer()) return true;
+  for (size_t k = 0; k < a.layout().of_body.size(); ++k)
+    if (a.body_size(static_cast<int>(k)) != b.body_size(static_cast<int>(k))) return false;
+  return true;
+}
+
+bool cut_at_the_same_rows(const Space& a, const Space& b) {
+  if (!cut_alike(a, b)) return false;
+  if (a.layout_pointer() == b.layout_pointer()) return true;
+  for (size_t k = 0; k < a.layout().of_body.size(); ++k)
+    if (!over_blocks(a, b, k, [](const auto& x, const auto& y) { return x.offset == y.offset && x.size == y.size; })) return false;
+  return true;
+}
 
 bool cut_in_one_way(const Expression& e) {
   std::unordered_map<const void*, const void*> bodies;  // by whose coordinates they are

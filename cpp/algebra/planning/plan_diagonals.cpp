@@ -51,9 +51,8 @@ std::optional<int> Planner::structural_diagonal(const Expression& e) {
       return emit_blocks(std::move(s), e, "blockdiag(" + shown(e) + ")");
     }
     case NodeKind::inverse: {
-      const Expression& inner = e.children()[0];
-      if (!is_upper_triangular(inner) && !is_lower_triangular(inner)) return std::nullopt;
-      const auto r = diagonal_by_structure(inner);
+      if (!is_upper_triangular(e) && !is_lower_triangular(e)) return std::nullopt;
+      const auto r = diagonal_by_structure(e.children()[0]);
       if (!r) return std::nullopt;
       Step s{StepKind::invert_blocks};
       s.in = {*r};
@@ -180,7 +179,7 @@ std::optional<int> Planner::logdet_by_structure(const Expression& e) {
     s.text = "Σ ln det D(k)";
     return emit(std::move(s), scalar);
   }
-  if (!e.domain().belongs_to_bodies() || !e.codomain().belongs_to_bodies()) return std::nullopt;
+  if (!cut_equally(e.domain(), e.codomain())) return std::nullopt;  // triangular by blocks, and these are not square
   if (is_block_diagonal(e) || is_upper_triangular(e) || is_lower_triangular(e)) {
     const auto b = diagonal_by_structure(e);
     if (!b) return std::nullopt;

@@ -28,7 +28,7 @@ int Planner::apply_inverse(const Expression& e, int x) {
       return apply(lower(identity() - edges, true), x);
     }
   }
-  if (is_block_diagonal(inner)) return apply_blocks(blocks(e), false, x, shown(e));
+  if (is_block_diagonal(e)) return apply_blocks(blocks(e), false, x, shown(e));
   if (const auto root = gram_root(inner)) {
     Step s{StepKind::dense_solve};
     s.in = {factor_gram(inner, *root), x};
@@ -75,9 +75,13 @@ std::shared_ptr<const Plan> Planner::plan_operand(const Expression& operand) {
   planner.for_costs_ = for_costs_;
   planner.part_ = true;
   auto made = std::make_shared<const Plan>(planner.plan(operand, Request::apply));
-  for (size_t c = 0; c < made->contexts.size(); ++c)
-    context_of(Symbol{nullptr, made->contexts[c].source, made->contexts[c].binding, {}, {}}, made->groups[c]);
+  read_also(*made);
   return made;
+}
+
+void Planner::read_also(const Plan& operand) {
+  for (size_t c = 0; c < operand.contexts.size(); ++c) context_of(Symbol{nullptr, operand.contexts[c].source, operand.contexts[c].binding, {}, {}}, operand.groups[c]);
+  for (const auto& [name, r] : operand.vectors) named_vector(name, operand.registers[r].space);
 }
 
 // L⁻¹HψB of B*ψ*H*D⁻¹HψB, D = LL*, in whatever spelling reads the same from D⁻¹ to both sides: of the operators of nodes and of R^n, whose
@@ -126,8 +130,7 @@ int Planner::dense_factor(const Expression& operand, const std::string& reason) 
   const double n = operand.domain().dimension();
   Step f{StepKind::dense_factor};
   f.operand = std::make_shared<const Plan>(Planner(options_, *this).plan_lowered(operand));
-  for (size_t c = 0; c < f.operand->contexts.size(); ++c)
-    context_of(Symbol{nullptr, f.operand->contexts[c].source, f.operand->contexts[c].binding, {}, {}}, f.operand->groups[c]);
+  read_also(*f.operand);
   f.flops = 2 * n * n * n / 3 + n * f.operand->flops();
   f.bytes = 8 * n * n;
   f.tier = 4;

@@ -281,15 +281,7 @@ int Planner::vector_value(const Expression& e) {
   if (known != block_memo_.end()) return known->second;
   int r;
   if (e.kind() == NodeKind::vector) {
-    const auto found = plan_.vectors.find(e.node().name);
-    if (found != plan_.vectors.end()) {
-      if (!(plan_.registers[found->second].space == e.codomain()))
-        throw SpaceError("vector '" + e.node().name + "' is used in two spaces, " + plan_.registers[found->second].space.description() + " and " +
-                         e.codomain().description());
-      return found->second;
-    }
-    r = new_register(RegisterKind::vector, e.codomain(), {}, false);
-    plan_.vectors[e.node().name] = r;
+    r = named_vector(e.node().name, e.codomain());
   } else {
     const Symbol& symbol = e.node().symbol;
     Step s{StepKind::vector_symbol};
@@ -301,6 +293,14 @@ int Planner::vector_value(const Expression& e) {
   }
   block_memo_[id_of(e)] = r;
   return r;
+}
+
+int Planner::named_vector(const std::string& name, const Space& space) {
+  const auto found = plan_.vectors.find(name);
+  if (found == plan_.vectors.end()) return plan_.vectors[name] = new_register(RegisterKind::vector, space, {}, false);
+  const Space& known = plan_.registers[found->second].space;
+  if (!(known == space)) throw SpaceError("vector '" + name + "' is used in two spaces, " + known.description() + " and " + space.description());
+  return found->second;
 }
 
 int Planner::column(const Expression& e) {

@@ -6,6 +6,7 @@
 #include "algebra/language/lower.h"
 #include "algebra/language/patterns.h"
 #include "algebra/language/properties.h"
+#include "algebra/planning/check_shapes.h"
 #include "algebra/planning/costs.h"
 #include "algebra/planning/plan_tangents.h"
 #include "algebra/planning/planning.h"
@@ -226,18 +227,18 @@ void Planner::plan_dense(const Expression& e) {
 }
 
 void Planner::plan_diagonal(const Expression& e, const Expression& typed) {
-  if (!cut_alike(e.domain(), e.codomain())) return apply_to_identity(e);
-  const int b = diagonal_blocks(e);
   if (plan_.request == Request::block_diagonal) {
-    plan_.output = b;
+    if (!cut_alike(e.domain(), e.codomain())) return apply_to_identity(e);
+    plan_.output = diagonal_blocks(e);
     return;
   }
   const bool trace = plan_.request == Request::trace;
   const char* what = trace ? "trace" : "diagonal";
   if (e.domain().dimension() != e.codomain().dimension())
-    throw SpaceError(std::string(what) + " of " + show(typed) + ": it maps " + e.domain().description() + " to " + e.codomain().description());
+    throw SpaceError(std::string(what) + " of " + show(typed) + ", which maps " + e.domain().description() + " to " + e.codomain().description() + ": it is not square");
+  if (!cut_at_the_same_rows(e.domain(), e.codomain())) return apply_to_identity(e);  // entries (i, i) lie in no body's block
   Step s{trace ? StepKind::trace_of_blocks : StepKind::diagonal_of_blocks};
-  s.in = {b};
+  s.in = {diagonal_blocks(e)};
   s.text = what;
   plan_.output = emit(std::move(s), {trace ? RegisterKind::scalar : RegisterKind::vector, e.codomain(), {}, nullptr, false});
 }
@@ -299,6 +300,7 @@ void Planner::share_articulated() {
 
 void Planner::finish() {
   drop_unused(plan_);
+  check_shapes(plan_);
   share_articulated();
   emit_values();
 }

@@ -66,6 +66,8 @@ class Planner {
   int apply_inverse_tangent(const Symbol& symbol, int x);
   int apply_blocks(int block, bool transposed, int x, const std::string& text);
   int vector_value(const Expression& e);
+  int named_vector(const std::string& name, const Space& space);
+  void read_also(const Plan& operand);   // what an operand's plan reads: models at their states, named vectors
   int column(const Expression& e);   // a vector expression as one column, whatever the run's width
   int solve_realization(const Expression& e, int x);
   int dense_factor(const Expression& operand, const std::string& reason);   // a register of the whole plan

@@ -307,10 +307,7 @@ class RealizationBuilder {
   static bool tree_space(const Expression& e) { return e.domain().belongs_to_bodies() && e.codomain().belongs_to_bodies(); }
   static bool same_cut(const Space& a, const Space& b) {
     if (a.kind() == SpaceKind::Euclidean || b.kind() == SpaceKind::Euclidean) return a.dimension() == b.dimension() && a.kind() == b.kind();
-    if (!cut_alike(a, b)) return false;
-    for (size_t k = 0; k < a.layout().of_body.size(); ++k)
-      if (a.body_size(k) != b.body_size(k)) return false;
-    return true;
+    return cut_equally(a, b);
   }
 
   // States that their equations give explicitly (of resolvents and shifts) come before those of inverses, inner inverses before outer ones:

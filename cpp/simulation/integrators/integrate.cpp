@@ -96,6 +96,7 @@ class Run {
     whole_ = fresh_ = false;
     stepper_.advance(t_, x_);
     ++end_.cost.steps;
+    if (const int method = stepper_.method(); method != method_) end_.switches.emplace_back(to_double(kept_.t), method_ = method);
     finish(t_, x_);
     if (watch_.any())
       look_for_events();
@@ -104,6 +105,10 @@ class Run {
     if (options_.normalise || equations_.settles()) stepper_.forget();
     watcher_.step(t_, x_);
     tell_progress();
+    if (!stiff_ && stepper_.held() >= lasting) {
+      stiff_ = watcher_.stiff(t_, x_, stepper_.pace().size, S(plan_.times.back()));
+      if (!stiff_) stepper_.doubt();
+    }
   }
   void finish(const S& t, State& x) {
     equations_.settle(t, x);
@@ -162,6 +167,8 @@ class Run {
     watcher_.progress(to_double(t_));
   }
 
+  // Steps at the bound of stability after which a motion is no passing stiffness, and a word is due.
+  static constexpr int lasting = 1000;
   // Where the last step began.
   void keep() { kept_.t = t_, kept_.x = x_, kept_.pace = stepper_.pace(), kept_.signs = watch_.signs(); }
   // A run that goes on takes the step again that the end of this one cut short, so that its steps are those of one that never ended.
@@ -187,7 +194,8 @@ class Run {
   Checkpoint<S> kept_;
   S t_, to_ = S(0);
   size_t next_ = 1;
-  bool at_times_, forwards_ = true;
+  int method_ = 0;
+  bool at_times_, forwards_ = true, stiff_ = false;
   bool whole_ = false, fresh_ = false;  // where the run stands: a step had to end there; and what follows is counted anew
   std::chrono::steady_clock::time_point told_ = std::chrono::steady_clock::now();
 };

@@ -31,6 +31,8 @@ class Watcher {
   virtual void sample(const S&, const State&) {}       // the times asked for, in order
   virtual void event(int, const S&, const State&) {}
   virtual void progress(double) {}                     // some ten times a second
+  // Steps of this size seem to be held by stability, at this state, in a run that ends at `last`. Whether that is so: then it is not asked again.
+  virtual bool stiff(const S& /* t */, const State& /* x */, const S& /* step */, const S& /* last */) { return false; }
 };
 
 template <class S>
@@ -47,6 +49,7 @@ struct RunEnd {
   IntegrationCost cost;
   Checkpoint<S> checkpoint;
   int event = -1;  // the one that ended it
+  std::vector<std::pair<double, int>> switches;  // from when on which of several methods took the steps; of the first, where it is not number 0
 };
 
 // Throws EvaluationError that names the time where the state stops being finite or the step size falls to rounding; errors of the accelerations

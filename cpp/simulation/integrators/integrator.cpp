@@ -14,7 +14,13 @@ std::vector<Integrator> integrators_by(Way way) {
   return found;
 }
 
+std::string retired_integrator(const std::string& name) {
+  if (name != "fehlberg78") return "";
+  return "integrator 'fehlberg78' was removed: its error estimate is blind to forces that are functions of time; take 'dop853', of the same order";
+}
+
 Integrator integrator_from_name(const std::string& name) {
+  if (const std::string instead = retired_integrator(name); !instead.empty()) throw EvaluationError(instead);
   std::string all;
   for (size_t i = 0; i < std::size(integrator_records); ++i) {
     if (name == integrator_records[i].name) return static_cast<Integrator>(i);

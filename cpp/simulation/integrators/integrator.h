@@ -1,9 +1,10 @@
 // The integrators there are, and what they are told.
 //
 // name                 method                                                     order  steps       on the group
+// auto                 dopri5, and rosenbrock4 where the motion is stiff (switching_steps.h)  4  controlled
 // dopri5               Runge-Kutta 5(4) of Dormand and Prince                     5      controlled
 // cash-karp54          Runge-Kutta 5(4) of Cash and Karp                          5      controlled
-// fehlberg78           Runge-Kutta 8(7) of Fehlberg                               8      controlled
+// dop853               Runge-Kutta 8(5,3) of Dormand and Prince                   8      controlled
 // bulirsch-stoer       extrapolated midpoint rule                                 any    controlled
 // rosenbrock4          RODAS, L-stable, with exact derivatives (rosenbrock.h)     4      controlled  yes
 // rk4                  the classical Runge-Kutta                                  4      fixed
@@ -12,7 +13,8 @@
 // variational2         discrete Euler-Lagrange at midpoints (variational.h)       2      fixed       yes
 // variational4         five of its steps composed (Suzuki)                        4      fixed       yes
 //
-// A controlled step is taken where each component's error estimate e(i) is at most atol + rtol (|x(i)| + h |ẋ(i)|).
+// A controlled step is taken where each component's error estimate e(i) is at most atol + rtol (|x(i)| + h |ẋ(i)|). No estimate is blind to a right-hand
+// side that is a function of time alone, as that of Fehlberg's pair of order 7(8) is, 41/840 h (k₁ + k₁₁ - k₁₂ - k₁₃) at the nodes 0, 1, 0, 1.
 // Those on the group keep the lengths of quaternions. Sources: Boost.Odeint, and those that the headers name.
 #pragma once
 
@@ -21,7 +23,7 @@
 
 namespace pycraft {
 
-enum class Integrator { dopri5, cash_karp54, fehlberg78, bulirsch_stoer, rosenbrock4, rk4, rkmk4, semi_implicit_euler, variational2, variational4 };
+enum class Integrator { dopri5, automatic, cash_karp54, dop853, bulirsch_stoer, rosenbrock4, rk4, rkmk4, semi_implicit_euler, variational2, variational4 };
 
 // How accelerations are found for it (simulation/equations.h).
 enum class Way { at_states, of_steps, with_derivatives, by_momenta };
@@ -36,8 +38,9 @@ struct IntegratorRecord {
 };
 inline constexpr IntegratorRecord integrator_records[] = {
     {"dopri5", 5, Way::at_states, true, false, true},
+    {"auto", 4, Way::at_states, true, false, true},
     {"cash-karp54", 5, Way::at_states, true, false, true},
-    {"fehlberg78", 8, Way::at_states, true, false, false},
+    {"dop853", 8, Way::at_states, true, false, true},
     {"bulirsch-stoer", 0, Way::at_states, true, false, false},
     {"rosenbrock4", 4, Way::with_derivatives, true, true, true},
     {"rk4", 4, Way::at_states, false, false, true},
@@ -49,7 +52,9 @@ inline constexpr IntegratorRecord integrator_records[] = {
 inline constexpr const IntegratorRecord& record_of(Integrator integrator) { return integrator_records[static_cast<int>(integrator)]; }
 inline const char* integrator_name(Integrator integrator) { return record_of(integrator).name; }
 std::vector<Integrator> integrators_by(Way way);
-// Throws EvaluationError that lists the names there are.
+// What to take in place of an integrator that there was once, in words; empty: there was none of that name.
+std::string retired_integrator(const std::string& name);
+// Throws EvaluationError that lists the names there are, or says what to take.
 Integrator integrator_from_name(const std::string& name);
 
 struct IntegratorOptions {

@@ -1,8 +1,8 @@
 // A way of finding a scene's accelerations, paired with a method that steps by it. Each method says by a type what it takes,
 //
-//   ExplicitEquations      dopri5, cash-karp54, fehlberg78, bulirsch-stoer, rk4, rkmk4      scene_equations.h
+//   ExplicitEquations      dopri5, cash-karp54, dop853, bulirsch-stoer, rk4, rkmk4      scene_equations.h
 //   ImplicitEquations      semi-implicit-euler                                              scene_steps.h
-//   LinearizedEquations    rosenbrock4, in double precision                                 scene_linearized.h
+//   LinearizedEquations    rosenbrock4 and auto, in double precision                        scene_linearized.h
 //   VariationalEquations   variational2, variational4                                       scene_momenta.h
 //
 // so that no other pair compiles. What a scene's effects make of it is known when it runs: effects that act in implicit steps fit integrators that

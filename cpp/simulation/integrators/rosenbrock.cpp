@@ -198,7 +198,7 @@ class Rodas : public Attempts<double> {
 
 }  // namespace
 
-std::unique_ptr<Stepper<double>> rosenbrock_steps(LinearizedEquations<double>& equations, const IntegratorOptions& options) {
+std::unique_ptr<ControlledSteps<double>> rosenbrock_steps(LinearizedEquations<double>& equations, const IntegratorOptions& options) {
   const auto make = [&] { return std::make_unique<Rodas>(equations, options); };
   return std::make_unique<ControlledSteps<double>>(equations, make(), make(), options);
 }

@@ -20,6 +20,6 @@
 
 namespace pycraft {
 
-std::unique_ptr<Stepper<double>> rosenbrock_steps(LinearizedEquations<double>& equations, const IntegratorOptions& options);
+std::unique_ptr<ControlledSteps<double>> rosenbrock_steps(LinearizedEquations<double>& equations, const IntegratorOptions& options);
 
 }  // namespace pycraft

@@ -3,10 +3,10 @@
 #include <boost/numeric/odeint/stepper/bulirsch_stoer.hpp>
 #include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
 #include <initializer_list>
 #include <utility>
 
+#include "simulation/integrators/dormand_prince_8.h"
 #include "simulation/integrators/steps_on_the_group.h"
 
 namespace pycraft {
@@ -74,7 +74,8 @@ template <class S>
 class DormandPrince : public Attempts<S> {
  public:
   using State = std::vector<S>;
-  DormandPrince(ExplicitEquations<S>& equations, const IntegratorOptions& o) : equations_(equations), stages_(dormand_prince<S>()), checker_(S(o.atol), S(o.rtol), S(1), S(1)) {}
+  DormandPrince(Equations<S>& equations, const IntegratorOptions& o)
+      : equations_(equations), stages_(dormand_prince<S>()), checker_(S(o.atol), S(o.rtol), S(1), S(1)), apart_(apart()), count_(equations.size() - equations.integrals()) {}
 
   bool attempt(S& t, State& x, S& h) override {
     start_ = x;
@@ -89,12 +90,14 @@ class DormandPrince : public Attempts<S> {
     }
     t_from_ = t, t_to_ = t + h;
     x = stages_.last();
+    share_of_stability_ = stiffness_of_stages(stages_, apart_, 6, count_, error_, h) / 3.25;
     t += h;
     h = adjuster_.increase_step(h, error, 5);
     stages_.k(0).swap(stages_.k(6));
     return true;
   }
   void forget() override { known_ = false; }
+  double share_of_stability() const override { return share_of_stability_; }
   // y(θ) = y + h Σ b(i, θ) k(i).
   bool interpolate(const S& t, State& out) override {
     const auto r = ratio<S>;
@@ -123,12 +126,20 @@ class DormandPrince : public Attempts<S> {
   }
 
  private:
-  ExplicitEquations<S>& equations_;
+  // Of the last two stages, both at the end of a step.
+  static Weights<S> apart() {
+    const auto& rows = dormand_prince<S>().rows;
+    return difference(rows[6], rows[5]);
+  }
+  Equations<S>& equations_;
   Stages<S> stages_;
   odeint::range_algebra algebra_;
   odeint::default_error_checker<S, odeint::range_algebra, odeint::default_operations> checker_;
   odeint::default_step_adjuster<S, S> adjuster_;
   State start_, error_;
+  Weights<S> apart_;
+  int count_;
+  double share_of_stability_ = 0;
   S t_from_ = S(0), t_to_ = S(1);
   bool known_ = false;  // the first rate is that of x
 };
@@ -167,16 +178,22 @@ std::unique_ptr<Stepper<S>> runge_kutta_steps(ExplicitEquations<S>& equations, c
   };
   switch (o.integrator) {
     case Integrator::cash_karp54: return pair(odeint::runge_kutta_cash_karp54<State, S, State, S>());
-    case Integrator::fehlberg78: return pair(odeint::runge_kutta_fehlberg78<State, S, State, S>());
+    case Integrator::dop853: return twice([&] { return std::make_unique<DormandPrince8<S>>(equations, o); });
     case Integrator::bulirsch_stoer: {
       using Extrapolated = odeint::bulirsch_stoer<State, S, State, S>;
       return twice([&] { return std::make_unique<OdeintAttempts<S, Extrapolated>>(equations, Extrapolated(S(o.atol), S(o.rtol), S(1), S(1))); });
     }
     case Integrator::rk4: return std::make_unique<FixedSteps<S, ClassicalRungeKutta<S>>>(equations, o);
     case Integrator::rkmk4: return std::make_unique<FixedSteps<S, MuntheKaas4<S>>>(equations, o);
+    case Integrator::automatic:
     case Integrator::dopri5: return twice([&] { return std::make_unique<DormandPrince<S>>(equations, o); });
     default: refuse(o.integrator, "takes more than accelerations at states");
   }
+}
+
+std::unique_ptr<ControlledSteps<double>> dormand_prince_steps(Equations<double>& equations, const IntegratorOptions& o) {
+  const auto make = [&] { return std::make_unique<DormandPrince<double>>(equations, o); };
+  return std::make_unique<ControlledSteps<double>>(equations, make(), make(), o);
 }
 
 template PYCRAFT_RUNGE_KUTTA(double)

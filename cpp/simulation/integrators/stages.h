@@ -2,7 +2,8 @@
 //
 //   x(i) = x + Σ_j (a(i,j) h) k(j),   k(i) = f(x(i), t + c(i) h)
 //
-// Sums go in the order of j, without the a(i,j) that are zero.
+// Sums go in the order of j, without the a(i,j) that are zero. A method may stop before its last stages (up_to): to judge a step first, or to leave those
+// that dense output adds until it is asked for.
 // Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, Springer 1993, II.1, II.5.
 #pragma once
 
@@ -15,16 +16,31 @@ namespace pycraft {
 template <class S>
 struct Weights {
   int count = 0;
-  int of[7] = {};
-  S by[7] = {};
+  int of[12] = {};
+  S by[12] = {};
   void add(int rate, const S& weight) { of[count] = rate, by[count++] = weight; }
 };
+
+// a - b, in the order of the rates.
+template <class S>
+Weights<S> difference(const Weights<S>& a, const Weights<S>& b) {
+  Weights<S> w;
+  for (int rate = 0, i = 0, j = 0; i < a.count || j < b.count; ++rate) {
+    S by = S(0);
+    bool there = false;
+    if (i < a.count && a.of[i] == rate) by += a.by[i++], there = true;
+    if (j < b.count && b.of[j] == rate) by -= b.by[j++], there = true;
+    if (there) w.add(rate, by);
+  }
+  return w;
+}
 
 template <class S>
 struct Tableau {
   int stages;
-  S nodes[7];
-  Weights<S> rows[7], last, error;  // last: of the step, where it is not the last stage's state
+  S nodes[16];
+  Weights<S> rows[16], last, error;  // last: of the step, where it is not the last stage's state
+  int beyond = 0;                    // stages after those, of dense output alone
 };
 
 template <class S>
@@ -36,13 +52,16 @@ class Stages {
   // A step of size h from (t, x); known: the first rate is there already. x stays where it is.
   void begin(const State& x, const S& t, const S& h, bool known = false) {
     x_ = &x, t_ = t, h_ = h;
-    for (int i = 0; i < tableau_.stages; ++i) k_[i].resize(x.size());
+    for (int i = 0; i < tableau_.stages + tableau_.beyond; ++i) k_[i].resize(x.size());
     at_.resize(x.size());
     stage_ = known ? 1 : 0;
+    end_ = tableau_.stages;
   }
+  // So many stages in all, counted from the first, are gone through next.
+  void up_to(int stages) { end_ = stages; }
   // Whether there is a stage left: then its rate is to be found.
   bool next() {
-    if (stage_ == tableau_.stages) return false;
+    if (stage_ >= end_) return false;
     if (stage_ > 0) combine(tableau_.rows[stage_], at_);
     ++stage_;
     return true;
@@ -64,8 +83,8 @@ class Stages {
 
  private:
   void add(const Weights<S>& weights, const S* x, State& out) const {
-    S by[7];
-    const S* k[7];
+    S by[12];
+    const S* k[12];
     for (int j = 0; j < weights.count; ++j) by[j] = h_ * weights.by[j], k[j] = k_[weights.of[j]].data();
     switch (weights.count) {
       case 1: return add<1>(by, k, x, out);
@@ -73,7 +92,13 @@ class Stages {
       case 3: return add<3>(by, k, x, out);
       case 4: return add<4>(by, k, x, out);
       case 5: return add<5>(by, k, x, out);
-      default: return add<6>(by, k, x, out);
+      case 6: return add<6>(by, k, x, out);
+      case 7: return add<7>(by, k, x, out);
+      case 8: return add<8>(by, k, x, out);
+      case 9: return add<9>(by, k, x, out);
+      case 10: return add<10>(by, k, x, out);
+      case 11: return add<11>(by, k, x, out);
+      default: return add<12>(by, k, x, out);
     }
   }
   template <int n>
@@ -104,9 +129,9 @@ class Stages {
   const Tableau<S>& tableau_;
   const State* x_ = nullptr;
   S t_ = S(0), h_ = S(0);
-  std::array<State, 7> k_;
+  std::array<State, 16> k_;
   State at_;
-  int stage_ = 0;
+  int stage_ = 0, end_ = 0;
 };
 
 }  // namespace pycraft

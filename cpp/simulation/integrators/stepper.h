@@ -35,7 +35,7 @@ template <class S>
 struct Pace {
   S size = S(0);    // controlled: to be tried next, with a sign; fixed: of every step
   S origin = S(0);  // fixed: the time from which steps are counted
-  long taken = 0;   // fixed: and how many were taken since
+  long taken = 0;   // fixed: and how many were taken since; switching_steps.h: its method and what it counts
 };
 
 template <class S>
@@ -60,6 +60,12 @@ class Stepper {
   virtual bool interpolate(const S&, State&) { return false; }
   // Takes the step from (from, x) to `to` again, whatever its error, for interpolate. False where that has none.
   virtual bool again(const S&, const State&, const S&) { return false; }
+  // Of how many steps, up to the last, stability seems to have held the size, and not accuracy: the motion is stiff. doubt(): it is not, as was found
+  // otherwise; what is counted begins a thousand steps later.
+  virtual int held() const { return 0; }
+  virtual void doubt() {}
+  // Which of several methods took the last step; 0 of one alone.
+  virtual int method() const { return 0; }
 
   const Pace<S>& pace() const { return pace_; }
   long rejected() const { return rejected_; }
@@ -96,7 +102,22 @@ class Attempts {
   virtual void forget() {}
   virtual bool interpolate(const S&, State&) { return false; }
   virtual bool again(const S&, const State&, const S&) { return false; }
+  // h |λ| of the last step over that at which the method becomes unstable, λ the fastest rate that its stages saw; 0: not known.
+  virtual double share_of_stability() const { return 0; }
 };
+
+// The size of h |λ|, by the last two stages, both at the end of a step: |h (k - k')| / |y - y'|. apart: weights of y - y'; count: of numbers of the motion.
+// Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, Springer 1996, IV.2.
+template <class S>
+double stiffness_of_stages(Stages<S>& stages, const Weights<S>& apart, int last, int count, std::vector<S>& scratch, const S& h) {
+  stages.sum(apart, scratch);
+  double above = 0, below = 0;
+  for (int i = 0; i < count; ++i) {
+    const double k = to_double(S(stages.k(last)[i] - stages.k(last - 1)[i])), y = to_double(scratch[i]);
+    above += k * k, below += y * y;
+  }
+  return below > 0 ? std::abs(to_double(h)) * std::sqrt(above / below) : 0;
+}
 
 template <class S>
 class ControlledSteps : public Stepper<S> {
@@ -129,6 +150,7 @@ class ControlledSteps : public Stepper<S> {
       if (taken && finite_motion(equations_, x)) {
         if (cut_) t = end_;
         short_ = !cut_ && abs(t - from) < shortest(t) ? short_ + 1 : 0;
+        count(method_->share_of_stability());
         if (short_ == patience) refuse_step(t, x, std::to_string(patience) + " steps in a row were as short as " + short_number(to_double(before)) + " s");
         // A step cut short tells only whether the next may be longer.
         h = cut_ && abs(tried) < abs(h) ? h : tried;
@@ -143,6 +165,14 @@ class ControlledSteps : public Stepper<S> {
       h = abs(tried) < abs(before) ? tried : S(before / S(2));
       if (++refusals > 200 || abs(h) < shortest(t)) refuse_step(t, x);
     }
+  }
+  int held() const override { return std::max(stiff_, 0); }
+  void doubt() override { stiff_ = -1000, calm_ = 0; }
+  // What is counted for that, as one number; 0: nothing.
+  long counts() const { return calm_ + 8L * (stiff_ + 1024); }
+  void resume_counts(long counts) {
+    calm_ = counts == 0 ? 0 : static_cast<int>(counts % 8);
+    stiff_ = counts == 0 ? 0 : static_cast<int>(counts / 8) - 1024;
   }
   void within(const S& from, const State& x, const S& t, State& out) override {
     using std::abs;
@@ -163,6 +193,14 @@ class ControlledSteps : public Stepper<S> {
   // A step so short is the rounding of times, and no way to the end. First ones may be: threefold each time they have grown from the least double to
   // one in 700 steps.
   static constexpr int patience = 1000;
+  // Six others in a row end a series of steps at the bound of stability (Hairer's number).
+  static constexpr int others = 6, most = 1 << 30;
+  void count(double share) {
+    if (share > 1)
+      calm_ = 0, stiff_ = std::min(stiff_ + 1, most);
+    else if (share > 0 && ++calm_ == others)
+      calm_ = 0, stiff_ = std::min(stiff_, 0);
+  }
   S shortest(const S& t) const {
     using std::abs;
     return S(16) * epsilon<S>() * std::max(whole_, S(abs(t)));
@@ -196,7 +234,8 @@ class ControlledSteps : public Stepper<S> {
   IntegratorOptions options_;
   State kept_;
   S end_ = S(0), whole_ = S(0);
-  int short_ = 0;  // steps in a row that were as short as times are rounded
+  int short_ = 0;             // steps in a row that were as short as times are rounded
+  int stiff_ = 0, calm_ = 0;  // steps at the bound of stability, and others in a row since
 };
 
 // As many equal steps in a piece as make each at most options.step. Method::Needs says how it has accelerations found.
@@ -250,7 +289,7 @@ class FixedSteps : public Stepper<S> {
     int i = 0;
     while (std::isfinite(to_double(x[i]))) ++i;
     refuse(options_.integrator, "the state is no longer finite in the step after t = " + short_number(to_double(from)) + " s of " + short_number(to_double(h)) + " s: " +
-                                    equations_.name_of(i) + " is " + short_number(to_double(x[i])) + "; take smaller steps (step=)");
+                                    equations_.name_of(i) + " is " + (std::isnan(to_double(x[i])) ? "nan" : short_number(to_double(x[i]))) + "; take smaller steps (step=)");
   }
 
   Needs& equations_;

@@ -208,7 +208,7 @@ def certify_expression(
         time=lambda step: _seconds(lambda: as_returned(step), seconds),
         state=(q, v),
         square=None if square is None else (square, square.text()),
-        sources=sources if articulated else [],
+        sources=[s for s in sources if articulated and (s.derived_from or ("",))[0] != "loops"],  # rows of loops have no sweep
         floor=None,
         notes=_expression_notes(data, articulated),
     ))  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,8 +13,9 @@ from ...dynamics.by_realization import checked_forces
 from ...dynamics.integrator_names import integrator_named, integrator_names, takes_one_size
 from ...tidy import TidyTable, error_text, refusal_text, seconds_text
 from ..checked_options import checked_model, checked_names, checked_positive, checked_seconds
+from .confirmation import SECOND, about, confirmation, own_error
 
-INTEGRATORS = ("dopri5", "fehlberg78", "bulirsch-stoer", "rkmk4", "scipy:RK45", "scipy:DOP853", "scipy:LSODA")
+INTEGRATORS = ("dopri5", "dop853", "bulirsch-stoer", "rkmk4", "scipy:RK45", "scipy:DOP853", "scipy:LSODA")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 STEPS = tuple(0.05 / 2**k for k in range(0, 10, 2))
 """Seconds: of integrators with steps of one size."""
@@ -34,7 +36,9 @@ class WorkPrecisionTable(TidyTable):
     is not conserved or not given), "seconds" (of the whole run), "evaluations" (of the accelerations), "resolved" (whether the error
     stands above the reference's own), "refused" (the reason, where there is one).
 
-    `reference` is what errors are measured against, in words; `reference_error` its own error, measured as theirs.
+    `reference` is what errors are measured against, in words; `reference_error` its own error, measured as theirs: the larger of its
+    distances to a looser run and to the motion that a method of another family finds. `confirmation` says to how many digits both methods
+    agree, or that the reference is not confirmed.
     """
 
     columns: ClassVar[tuple[str, ...]] = (
@@ -53,6 +57,14 @@ class WorkPrecisionTable(TidyTable):
     @property
     def reference_error(self) -> float:
         return self.about["reference_error"]
+
+    @property
+    def confirmation(self) -> str:
+        return self.about.get("confirmation", "")
+
+    @property
+    def note(self) -> str:
+        return f"reference: {self.reference}, {self.confirmation}" if self.confirmation else ""
 
     def fastest(self, error: float) -> dict[str, Any]:
         """The cheapest row whose error is at most `error`. Raises ValueError where none is."""
@@ -131,8 +143,10 @@ def work_precision(
     A name or number stands for a list of one. The reference comes first and is two runs: of long or fast motions it may take longer than
     every row, and an interrupt ends it.
 
-    The reference is fehlberg78 in extended precision at a tolerance of 1e-16 (with a right-hand side: DOP853 at 1e-13 in double). Its own
-    error is its distance to a run at a hundred times that tolerance, which the motion's sensitivity is in; rows below it are not resolved.
+    The reference is dop853 in extended precision at a tolerance of 1e-16 (with a right-hand side: DOP853 at 1e-13 in double). Its own
+    error is its distance to a run at a hundred times that tolerance, which the motion's sensitivity is in, or to the motion that an
+    extrapolation method finds (bulirsch-stoer), if that is larger; rows below it are not resolved. The table says to how many digits both
+    methods agree; below six the reference is not confirmed, which the table and a ModelWarning say.
     Trajectories are compared at eight times; integrators of other packages interpolate to them, the core's end a step there.
 
     Raises
@@ -172,10 +186,17 @@ def work_precision(
     integrate = _runs(model, q, v, times, tau, form, refine, right_hand_side)
     if progress is not None:
         progress("reference")
-    name, wide, tolerance = ("fehlberg78", "extended", 1e-16) if right_hand_side is None else ("scipy:DOP853", "double", 1e-13)
+    name, wide, tolerance = ("dop853", "extended", 1e-16) if right_hand_side is None else ("scipy:DOP853", "double", 1e-13)
     truth = integrate(name, wide, rtol=tolerance, atol=tolerance)
     looser = integrate(name, wide, rtol=100 * tolerance, atol=100 * tolerance)
-    own = trajectory_error(model, truth[0], looser[0])
+    tightest = tolerance if right_hand_side is None else 10 * tolerance  # in double precision, of a right-hand side
+    found = confirmation(
+        truth[0],
+        lambda: integrate(SECOND, wide, rtol=tightest, atol=tightest)[0],
+        partial(trajectory_error, model),
+        f"{SECOND} in {wide} precision",
+    )
+    own = own_error(trajectory_error(model, truth[0], looser[0]), found)
     scale = max((float(model.kinetic_energy(x, y)) for x, y in zip(truth[0], truth[1], strict=True)), default=0.0)
 
     rows = []
@@ -192,7 +213,7 @@ def work_precision(
         rows,
         {
             "model": model.name, "nv": model.nv, "duration": duration, "reference": f"{name} in {wide} precision, tolerance {tolerance:g}",
-            "reference_error": own, "gravity": [float(g) for g in model.gravity], "q": q.tolist(), "v": v.tolist(),
+            "reference_error": own, **about(found), "gravity": [float(g) for g in model.gravity], "q": q.tolist(), "v": v.tolist(),
         },
     )  # fmt: skip
 

@@ -1,0 +1,29 @@
+"""What is said of a motion whose steps are held by stability, not by accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+TAKE = "Take integrator='rosenbrock4', or 'auto', which takes it where the motion is stiff"
+TAKE_DOUBLE = "Take integrator='rosenbrock4' in precision='double', or a softer law"
+
+
+def stiffness_text(of: str, integrator: str, found: Mapping[str, Any], remedy: str) -> str:
+    """The text of a warning.
+
+    Parameters
+    ----------
+    of : what is stiff, as "the scene of 'arm'"
+    found : of the core: t and step (s), left (steps of that size to the end), rate (1/s, negative; 0 where only the stages of the method's
+        steps show it), the effect whose forces decay so fast and the coordinate that they act on ("" where not known)
+    remedy : a sentence
+    """
+    what = "the motion decays faster than that"
+    if found["rate"]:
+        by = f"effect '{found['effect']}' damps" if found["effect"] else "the equations damp"
+        what = f"{by} coordinate '{found['coordinate']}' at a rate of {-found['rate']:.2g} /s"
+    return (
+        f"{of} is stiff: integrator {integrator!r} takes steps of {found['step']:.2g} s at t = {found['t']:.3g} s, "
+        f"which stability holds and not accuracy, {found['left']:.2g} of them to the end; {what}. {remedy}"
+    )
