@@ -215,6 +215,7 @@ AREAS = {
     "pycraft/identities/spelling.py": ["identities/test_spellings.py", "identities/test_readings.py"],
     "pycraft/identities/definitions.py": ["identities/test_letters.py"],
     "pycraft/identities/vocabulary.py": ["identities/test_letters.py"],
+    "pycraft/proofs/lifting.py": ["identities/test_letters.py"],
     "pycraft/identities/standard_letters.py": ["identities/test_letters.py"],
     "pycraft/identities/truth.py": ["identities/test_truth.py", "identities/test_statements.py"],
     "pycraft/identities/family.py": ["identities/test_truth.py"],
