@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from copy import copy
 from typing import Any
 
@@ -13,6 +14,19 @@ from . import _core
 
 LARGEST = 2**31 - 1
 """What the core's integers hold."""
+
+
+@contextmanager
+def of_state(state: int, states: int) -> Iterator[None]:
+    """What is raised inside tells which state of a batch it is of, as the core's own batches do."""
+    try:
+        yield
+    except _core.Error as error:
+        if states < 2:
+            raise
+        told = type(error)(f"{error} (state {state} of a batch of {states})")
+        vars(told).update(vars(error))
+        raise told from None
 
 
 def text(name: Any, what: str) -> str:

@@ -2,6 +2,7 @@
 #include "bindings/direct_calls.h"
 #include "dynamics/batch_curvature.h"
 #include "dynamics/batch_sensitivities.h"
+#include "model/rotor_forces.h"
 
 namespace pycraft {
 
@@ -38,6 +39,21 @@ py::tuple three(const Multibody& model, const Arguments& given, F f) {
   const Undisturbed undisturbed(model);
   f(to);
   return all;
+}
+
+// A matrix (nv, nv) for each row of v (B, nv), which f adds to.
+template <class F>
+py::array_t<double> of_rotors(const Multibody& model, const Array& v, F f) {
+  const auto numbers = model.compiled<double>();
+  const py::ssize_t n = numbers->nv;
+  if (v.ndim() != 2 || v.shape(1) != n) throw ModelError("v of '" + model.name() + "' takes " + std::to_string(n) + " numbers a state");
+  py::array_t<double> made(std::vector<py::ssize_t>{v.shape(0), n, n});
+  std::fill_n(made.mutable_data(), made.size(), 0.0);
+  for (py::ssize_t b = 0; b < v.shape(0); ++b) {
+    double* const to = made.mutable_data() + b * n * n;
+    f(*numbers, b, [to, n](py::ssize_t i, py::ssize_t j) -> double& { return to[i * n + j]; });
+  }
+  return made;
 }
 
 }  // namespace
@@ -117,6 +133,22 @@ void register_sensitivities(py::module_& m) {
         Arguments given(mb, {{"q", q}, {"v", v}, {"vdot", vdot}});
         return run(d, precision, given, py::none(), {n, 10 * mb.bodies()}, [](auto& w, auto in, auto* y) { w.inertial_regressor(in[0], in[1], in[2], y); });
       }, q, v, py::arg("vdot"), precision)
+      .def("rotor_regressor", [](const BatchSensitivities& d, const Array& v, const Array& vdot) {
+        return of_rotors(d.model(), v, [&](const CompiledModel<double>& m, py::ssize_t b, auto out) {
+          std::vector<double> J(m.nv, 0.0), c(m.nv);
+          for (int j = 0; j < m.nv; ++j) {
+            J[j] = 1, std::fill(c.begin(), c.end(), 0.0);
+            for (int k = 0; k < m.bodies; ++k) rotor_forces(m, k, J.data(), v.data() + b * m.nv, c.data());
+            c[j] += vdot.at(b, j), J[j] = 0;
+            for (int i = 0; i < m.nv; ++i) out(i, j) = c[i];
+          }
+        });
+      }, v, py::arg("vdot"))
+      .def("rotor_coriolis", [](const BatchSensitivities& d, const Array& v, bool christoffel) {
+        return of_rotors(d.model(), v, [&](const CompiledModel<double>& m, py::ssize_t b, auto out) {
+          for (int k = 0; k < m.bodies; ++k) each_rotor_coriolis(m, k, m.rotor_inertia.data(), v.data() + b * m.nv, christoffel, [&](int i, int j, double x) { out(i, j) += x; });
+        });
+      }, v, py::arg("christoffel"))
       .def("log_determinant", [](BatchSensitivities& d, const std::string& over, const py::object& q, Precision precision) {
         const Multibody& mb = d.model();
         const int n = mb.nv(), bodies = mb.bodies();

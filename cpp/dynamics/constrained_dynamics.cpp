@@ -6,6 +6,7 @@
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "algebra/trees/sweeps/mass_matrix.h"
+#include "dynamics/own_units.h"
 #include "model/checks.h"
 #include "model/recorded_model.h"
 #include "model/unit_data.h"
@@ -153,8 +154,8 @@ void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
     for (size_t c = 0; c < m; ++c) part_[active_[g][c]] = scale_[c];
     if (!first) continue;
     S size = S(0);
-    for (const int row : rows) size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit(row)));
-    for (const int row : rows) sizes_[row] = size, off_[row] = abs(asked(row)) / unit(row);
+    for (const int row : rows) sizes_[row] = rows_.product_size(row, x_.data()) + bias_[row], size = maximum(size, S(sizes_[row] / unit(row)));
+    for (const int row : rows) off_[row] = abs(asked(row)) / unit(row);
     for (size_t c = 0; c < m; ++c) off_[active_[g][c]] = abs(conflict_[c]);
     for (const int row : rows) {
       if (vanishes(off_[row])) continue;
@@ -163,7 +164,7 @@ void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
     }
   }
   if (worst > S(0))
-    refuse_rows(off_, worst, "rows of loops hang together and ask for different accelerations of one motion, at a singular state or by functions that conflict,");
+    refuse_rows(off_, worst, "rows of loops hang together and ask for different accelerations of one motion, at a singular state, by functions that conflict, or, where masses are far apart, by rounding (take a wider precision),");
   delta_.assign(nv, S(0)), r_.assign(nv, S(0));
   rows_.add_transposed(part_.data(), r_.data());
   solve(r_.data(), delta_.data());
@@ -220,7 +221,7 @@ void ConstrainedWorkspace<S>::add_correction() {
   for (size_t i = 0; i < x_.size(); ++i) x_[i] += before_[i];
 }
 
-// Whether θ̈ and λ keep both equations, in units of energy: what is off in the rows, and in the equations of motion.
+// Whether θ̈ and λ keep both equations: what is off in the rows, in units of energy and in their own, and in the equations of motion.
 template <class S>
 bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied, bool refuse) {
   using std::abs, std::sqrt;
@@ -233,7 +234,7 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
     S size = S(0);  // what has cancelled in the rows: the tree's own accelerations, or those of the result
     for (const int row : rows) {
       size = maximum(size, S((rows_.product_size(row, x_.data()) + bias_[row]) / unit(row)));
-      size = maximum(size, sizes_[row]);
+      size = maximum(size, S(sizes_[row] / unit(row)));
     }
     for (const int row : rows) {
       const S left = abs(rows_.product(row, x_.data()) + c_[row]) / unit(row);
@@ -242,6 +243,7 @@ bool ConstrainedWorkspace<S>::sure(const Asked& asked, const Applied<S>& applied
       worst = maximum(worst, left);
     }
   }
+  if (!(worst > S(0))) worst = off_in_own_units(rows_, asking_, x_.data(), c_.data(), bias_.data(), sizes_.data(), certified(), off_);
   if (worst > S(0)) {
     if (refuse) refuse_rows(off_, worst, "no sure accelerations, near a singular state or by rounding (take refine='auto', or a wider precision): off are rows");
     return false;
@@ -347,7 +349,24 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   if (asked.driven)
     for (int r = 0; r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
   factor(c_.data());
-  meet(c_.data(), true);
+  // The same state in the next wider scalar, where what rounding hid of the rows is seen, or refused.
+  const bool settling = settles_rows_of<S>(*loops);
+  const auto settle = [&] {
+    if constexpr (settles<S>) {
+      using T = Wider<S>;
+      std::vector<Vector6<T>> pushed;
+      const Applied<T> same = converted(applied, model_->bodies, pushed);
+      const std::vector<T> q(asked.q, asked.q + model_->nq), v(asked.v, asked.v + nv), tau(asked.tau, asked.tau + nv);
+      std::vector<T> driven;
+      if (asked.driven) driven.assign(asked.driven, asked.driven + rows);
+      ConstrainedWorkspace<T> wider(source_, terms_);
+      if (!added_.empty()) wider.add_to_hinges(std::vector<T>(added_.begin(), added_.end()).data());
+      wider.accelerate(loops, {q.data(), v.data(), tau.data(), nullptr, nullptr, &same, asked.form, {}, asked.gains, asked.driven ? driven.data() : nullptr});
+      take(wider.result(), x_), take(wider.multipliers(), lambda_);
+      stand_for(wider.rank(), systems_);
+    }
+  };
+  meet(c_.data(), true);  // what it refuses here a wider scalar might meet by noise alone
   const int steps = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;
   S last = S(0);
   for (int step = 0; step < steps; ++step) {
@@ -358,7 +377,10 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
     if (moved <= S(4) * epsilon<S>() * size || (step > 0 && S(2) * moved > last)) break;
     last = moved;
   }
-  for (int more = 0; !sure(asked, applied, more == 3); ++more) correct(asked, applied);
+  for (int more = 0; !sure(asked, applied, more == 3 && !settling); ++more) {
+    if (more == 3) return settle();
+    correct(asked, applied);
+  }
 }
 
 template <class S>

@@ -26,12 +26,16 @@ void Curvature<T>::inverse_dynamics(const T* q, const T* v, const T* vdot, const
     frame_.fill(model_, blocks_, field, state_.v.data(), vdot_.data());
     for (int m = 0; m < count; ++m) {
       contract(mu + size_t(m) * N);
+      of_rotors_.assign(N, S(0));
+      mu_.assign(mu + size_t(m) * N, mu + size_t(m + 1) * N);
+      for (int k = 0; k < model_.bodies && model_.has_rotor_inertia; ++k)
+        add_rotor_power_gradient(model_, k, model_.rotor_inertia.data(), state_.v.data(), mu_.data(), of_rotors_.data());
       T* const to = out + size_t(m) * blocks * square;
       for (int j = 0; j < N; ++j) {
         const int k = frame_.body_of[j];
         const Vector6<S>& P = momentum_[k];
         const Vector3<S>& C = couple_[k];
-        const S of_v = dot(frame_.twist_rate[j] + frame_.psi_dot[j], P) + dot(frame_.twist[j].angular, C);
+        const S of_v = dot(frame_.twist_rate[j] + frame_.psi_dot[j], P) + dot(frame_.twist[j].angular, C) + of_rotors_[j];
         if (!along_q) {
           for (int w = 0; w < directions; ++w) to[3 * square + size_t(first - N + w) * N + j] = of_v.d[w];
           continue;

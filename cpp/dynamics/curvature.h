@@ -8,9 +8,9 @@
 // with the sums R, B and F over subtrees, so that P = Σ I W and C = Σ B* W. A displacement along S_j moves all that is outboard rigidly, which
 // changes no power; what it changes besides is ψ̇_j, ψ̈_j and χ_j, the same for every body there:
 //
-//   ∂(μ*T)/∂q_j = ψ̈_j·P + ψ̇_j·C + χ_j·F,    ∂(μ*T)/∂v_j = (Ṡ_j + ψ̇_j)·P + S_j·C,    ∂(μ*T)/∂v̇_j = S_j·P + (J μ)_j
+//   ∂(μ*T)/∂q_j = ψ̈_j·P + ψ̇_j·C + χ_j·F,    ∂(μ*T)/∂v_j = (Ṡ_j + ψ̇_j)·P + S_j·C + ∂(μ*c)/∂v_j,    ∂(μ*T)/∂v̇_j = S_j·P + (J μ)_j
 //
-// These are computed on numbers with derivatives along four directions at a time, whose derivatives are the second ones: along q_i of a
+// with c(v) of rotors (model/rotor_forces.h). These are computed on numbers with derivatives along four directions at a time, whose derivatives are the second ones: along q_i of a
 // derivative along q_j, which on ball and free hinges are quasi-velocities and do not commute. Cost O(N · nv).
 // Source: the gradient of the power as in J. Nganga, P. M. Wensing, Accelerating second-order differential dynamic programming for rigid-body
 // systems, IEEE Robotics and Automation Letters 6 (2021), there by reverse accumulation, here in closed form.
@@ -48,7 +48,7 @@ class Curvature {
   RigidBlocks<S> blocks_;
   InertialFrame<S> frame_;
   TangentDirections<T, width> state_;
-  std::vector<S> vdot_;
+  std::vector<S> vdot_, mu_, of_rotors_;          // of rotors: ∂(μ*c)/∂v
   std::vector<Vector6<S>> W_, momentum_, chi_;    // W per body; p, then P; χ per coordinate
   std::vector<Vector3<S>> couple_;                // c, then C: the linear part of B* W is zero
 };

@@ -45,7 +45,7 @@ DividedDynamics<S>::DividedDynamics(const Multibody& model)
     : source_(model), tree_(model.structure()), model_(model.compiled<S>()), assembly_(model_->parent), blocks_(tree_) {
   const size_t bodies = model_->bodies, coordinates = model_->nv, nodes = assembly_.nodes().size();
   set_constants(*model_, blocks_);
-  points_.resize(model_->bodies, model_->nv);
+  points_.resize(*model_);
   lent_.resize(bodies), alpha_.resize(bodies), interbody_.resize(bodies), gathered_.resize(bodies);
   size_t numbers = 0;
   for (const int n : model_->nv_of) l_.push_back(numbers), numbers += size_t(n) * n;
@@ -108,7 +108,7 @@ void DividedDynamics<S>::forward_dynamics(const S* q, const S* v, const S* tau, 
     cut_for_ = threads;
   }
   const Call call{q, v, tau, vdot, applied, threads};
-  points_.resize(model_->bodies, model_->nv);
+  points_.resize(*model_);
   for (const int root : assembly_.roots()) omega_[root] = Vector3<S>::zero();
   start_at(applied.base());
   inwards(threads, [&](int i) { turn(call, i); });
@@ -214,7 +214,7 @@ S DividedDynamics<S>::body(const Call& call, int i) {
     hinge.b[j] = blocks_.H[first + j];
     hinge.x[j] = model_->rotor_inertia[first + j];
     plain &= hinge.x[j] == S(0);
-    eta_[first + j] = call.tau[first + j];
+    eta_[first + j] = points_.without_rotors(first + j, call.tau[first + j]);
   }
   const auto annihilates = [&](int row) {
     const auto aligned = model_->aligned.begin() + first;

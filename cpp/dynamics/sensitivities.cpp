@@ -43,6 +43,7 @@ template <class S>
 void Sensitivities<S>::inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv, const Vector3<S>* gravity) {
   frame_at(q, v, vdot, gravity);
   differentiate_forces(dq, dv, model_->nv);
+  differentiate_rotors(v, dv, model_->nv);
 }
 
 template <class S>
@@ -78,6 +79,13 @@ void Sensitivities<S>::differentiate_forces(S* dq, S* dv, int stride) {
 }
 
 template <class S>
+void Sensitivities<S>::differentiate_rotors(const S* v, S* dv, int stride) const {
+  const CompiledModel<S>& m = *model_;
+  for (int k = 0; k < m.bodies && m.has_rotor_inertia && v; ++k)
+    each_rotor_force_rate(m, k, m.rotor_inertia.data(), v, [&](int i, int j, const S& rate) { dv[size_t(i) * stride + j] += rate; });
+}
+
+template <class S>
 void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau,
                                          const Vector3<double>* gravity) {
   const int N = model_->nv;
@@ -95,6 +103,7 @@ void Sensitivities<S>::forward_dynamics(const double* q, const double* v, const 
   frame_.fill(*model_, blocks_, cast<S>(weight.gravity), v_.data(), rates_.data(), OwnTerms::absorbed);
   // Columns: ∂T/∂q, ∂T/∂v, 1.
   differentiate_forces(work_.data(), work_.data() + N, 3 * N);
+  differentiate_rotors(v_.data(), work_.data() + N, 3 * N);
   for (int i = 0; i < N; ++i)
     for (int j = 0; j < N; ++j) work_[size_t(i) * 3 * N + 2 * N + j] = S(i == j ? 1 : 0);
   dynamics_->mass_matrix_solve(q, work_.data(), 3 * N, solution_.data(), how);
@@ -233,6 +242,23 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
           for (size_t row = 0; row < n * n; ++row) out[row * n + k] = S(0);
     }
   }
+  // Rotors: the same brackets, paired by J, which is of the subhinge's own coordinates alone.
+  for (int a = 0; a < N && m.has_rotor_inertia; ++a)
+    with_subhinge(m.subhinges[frame_.subhinge_of[a]].kind, [&](auto row) {
+      if constexpr (row.nv > 1) {
+        int first = a;
+        while (first > 0 && frame_.subhinge_of[first - 1] == frame_.subhinge_of[a]) --first;
+        S one[row.nv], other[row.nv], bracket[row.nv];
+        std::fill_n(one, row.nv, S(0)), std::fill_n(other, row.nv, S(0));
+        one[a - first] = S(1);
+        for (int b = 0; b < row.nv; ++b) {
+          other[b] = S(1);
+          row.bracket(static_cast<const S*>(one), static_cast<const S*>(other), bracket);
+          other[b] = S(0);
+          for (int c = 0; c < row.nv; ++c) add(a, first + b, first + c, S(m.rotor_inertia[first + c] * bracket[c]));
+        }
+      }
+    });
 }
 
 template <class S>
@@ -241,6 +267,9 @@ void Sensitivities<S>::coriolis_matrix(const S* q, const S* v, bool skew, S* out
   if (!coriolis_) coriolis_ = std::make_unique<CoriolisBodies<S>>(*model_);
   coriolis_->fill(*model_, blocks_, v);
   pycraft::coriolis_matrix(*model_, *coriolis_, skew, out);
+  const CompiledModel<S>& m = *model_;
+  for (int k = 0; k < m.bodies && m.has_rotor_inertia; ++k)
+    each_rotor_coriolis(m, k, m.rotor_inertia.data(), v, !skew, [&](int i, int j, const S& x) { out[size_t(i) * m.nv + j] += x; });
 }
 
 // With the momentum of the bodies as it is seen from the frame, (n; f), and R(0; u) = (h × u; m u) of what it does not see:
@@ -267,7 +296,8 @@ void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S
   mass_matrix_inverse_apply(tree_, blocks_, p, v, 1, scratch_.data());
   frame_.fill(*model_, blocks_, g, v, nullptr);
   // d(S_j·p)/dt = Ṡ_j·p + S_j·ṗ, and S_j·ṗ is what the hinge's force and gravity do: tau_j + S_j·(weight outboard). Of Ṡ_j·p, with u in
-  // both, what multiplies u twice is (u × s)·mu = 0.
+  // both, what multiplies u twice is (u × s)·mu = 0. Rotors keep their own momentum: -c(v).
+  rates_.assign(model_->nv, S(0));
   for (int k = 0; k < model_->bodies; ++k) {
     check_interrupt_at(k);
     int root = k;
@@ -277,6 +307,9 @@ void Sensitivities<S>::hamiltonian(const S* q, const S* p, const S* tau, S* v, S
     for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j)
       p_rate[j] = tau[j] + dot(frame_.twist_rate[j], momentum) + dot(frame_.twist_rate[j], frame_.R[k] * travel) +
                   dot(cross_motion(travel, frame_.twist[j]), momentum) + dot(frame_.twist[j], frame_.R[k] * field);
+    if (!model_->has_rotor_inertia) continue;
+    rotor_forces(*model_, k, model_->rotor_inertia.data(), v, rates_.data());
+    for (int j = model_->v_offset[k]; j < model_->v_offset[k] + model_->nv_of[k]; ++j) p_rate[j] -= rates_[j];
   }
 }
 

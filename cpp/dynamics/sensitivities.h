@@ -20,7 +20,7 @@ class Sensitivities {
  public:
   explicit Sensitivities(const Multibody& model);
 
-  // ∂T/∂q, ∂T/∂v (nv x nv), row the component of T. Rotor inertias add J to ∂T/∂v̇ = ℳ + J alone.
+  // ∂T/∂q, ∂T/∂v (nv x nv), row the component of T. Rotors add J to ∂T/∂v̇ = ℳ + J, and ∂c/∂v of their v ×* (J v) to ∂T/∂v.
   // Here and below a null gravity is the model's.
   void inverse_dynamics(const S* q, const S* v, const S* vdot, S* dq, S* dv, const Vector3<S>* gravity = nullptr);
   // ∂v̇/∂q, ∂v̇/∂v, ∂v̇/∂T = (ℳ + J)⁻¹ of forward dynamics, in its form: -(ℳ + J)⁻¹ ∂T at v̇, with its corrections, or in a factored form the
@@ -43,7 +43,7 @@ class Sensitivities {
   // d/dt of the node Jacobian (6 x nv), and ∂𝒥/∂q (6, nv, nv), both in the node's axes.
   void jacobian_rate(const Node& node, const S* q, const S* v, S* out);
   void jacobian_derivative(const Node& node, const S* q, S* out);
-  // Y (nv, 10 bodies) with T = Y π + J v̇; π per body: mass, m c (3), rotational inertia about its origin (xx, xy, xz, yy, yz, zz).
+  // Y (nv, 10 bodies) with T = Y π + J v̇ + v ×* (J v); π per body: mass, m c (3), rotational inertia about its origin (xx, xy, xz, yy, yz, zz).
   void inertial_regressor(const S* q, const S* v, const S* vdot, S* out, const Vector3<S>* gravity = nullptr);
   // ∂ ln det(ℳ + J): along coordinates (nv); by π (10 per body); by a twist of each hinge's placement (6 per body); by the rows of H as
   // they stand in the body's axes, poses held (6 per coordinate). Each may be null. Three sweeps in all.
@@ -53,6 +53,7 @@ class Sensitivities {
   void frame_at(const S* q, const S* v, const S* vdot, const Vector3<S>* gravity = nullptr);
   void twists_about(int body);  // of the coordinates on its path, about its origin: outboard_
   void differentiate_forces(S* dq, S* dv, int stride);  // ∂T/∂q, ∂T/∂v in the frame that was filled
+  void differentiate_rotors(const S* v, S* dv, int stride) const;  // += ∂c/∂v of the rotors' v ×* (J v)
   void differentiate_absorbed(S* dv);
   bool differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau, const Applied<double>* applied);
   Pose<S> node_in_axes(const Node& node) const;

@@ -4,6 +4,7 @@
 
 #include "algebra/trees/sweeps/articulated_inertia.h"
 #include "dynamics/constrained_dynamics.h"
+#include "dynamics/own_units.h"
 #include "model/configuration.h"
 #include "recursions/kinematics.h"
 
@@ -63,7 +64,20 @@ void ConstrainedWorkspace<S>::project(const std::shared_ptr<const ResolvedLoops>
     for (const int row : group.rows)
       if (const S left = abs(rows_.product(row, x_.data())) / unit(row); !(left <= certified() * size)) off_[row] = left == left ? left : S(1), worst = maximum(worst, off_[row]);
   }
-  if (worst > S(0)) refuse_rows(off_, worst, "no sure velocities on the loops, near a singular state or by rounding (take a wider precision): off are rows");
+  const std::vector<S> nothing(rows, S(0));
+  if (!(worst > S(0))) worst = off_in_own_units(rows_, asking_, x_.data(), c_.data(), nothing.data(), bias_.data(), certified(), off_);
+  if (!(worst > S(0))) return;
+  if constexpr (settles<S>) if (settles_rows_of<S>(*loops)) {
+    using T = Wider<S>;
+    const std::vector<T> at(q, q + model_->nq), before(v, v + nv), impulse(p, p + nv);
+    ConstrainedWorkspace<T> wider(source_, terms_);
+    if (!added_.empty()) wider.add_to_hinges(std::vector<T>(added_.begin(), added_.end()).data());
+    wider.project(loops, at.data(), before.data(), impulse.data(), form);
+    for (int i = 0; i < nv; ++i) x_[i] = static_cast<S>(wider.result()[i]);
+    for (int r = 0; r < rows; ++r) lambda_[r] = static_cast<S>(wider.multipliers()[r]);
+    return stand_for(wider.rank(), systems_);
+  }
+  refuse_rows(off_, worst, "no sure velocities on the loops, near a singular state or by rounding (take a wider precision): off are rows");
 }
 
 template <class S>
@@ -108,6 +122,7 @@ void ConstrainedWorkspace<S>::close(S* q) {
 
 template <class S>
 void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& loops, S* q, S* v, const S* rates, Form form) {
+  using std::abs, std::sqrt;
   set_loops(loops);
   const int nv = model_->nv, rows = loops->rows;
   find_off(loops, q, v, rates, gone_, slip_);
@@ -118,10 +133,24 @@ void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& 
   if (blocks_.faint().body >= 0) throw_faint_hinge(tree_, blocks_.faint());
   factor(nullptr);
   close(q);
-  rows_.find(*model_, *loops, q, buffers_);
+  find_off(loops, q, nullptr, nullptr, gone_, slip_);  // and the rows there
   x_.assign(v, v + nv), target_.assign(rows, S(0));
   for (int r = 0; rates && r < rows; ++r) target_[r] = -rates[r];
   for (int time = 0; time < 3; ++time) meet(target_.data(), false);
+  if constexpr (settles<S>) if (settles_rows_of<S>(*loops)) {  // what rounding hid: the wider scalar takes it the rest of the way, from what is there already
+    sizes_.assign(rows, S(0)), bias_.assign(rows, S(0));
+    for (int r = 0; r < rows; ++r) bias_[r] = abs(target_[r]) + S(stopped) * size_of(r) / certified(), sizes_[r] = rows_.product_size(r, v) + bias_[r];
+    if (largest(gone_) > sqrt(epsilon<S>()) || off_in_own_units(rows_, asking_, x_.data(), target_.data(), bias_.data(), sizes_.data(), certified(), off_) > S(0)) {
+      using T = Wider<S>;
+      std::vector<T> at(q, q + model_->nq), motion(x_.begin(), x_.end()), driven;
+      if (rates) driven.assign(rates, rates + rows);
+      ConstrainedWorkspace<T> wider(source_, terms_);
+      if (!added_.empty()) wider.add_to_hinges(std::vector<T>(added_.begin(), added_.end()).data());
+      wider.bring(loops, at.data(), motion.data(), rates ? driven.data() : nullptr, form);
+      for (int i = 0; i < model_->nq; ++i) q[i] = static_cast<S>(at[i]);
+      for (int i = 0; i < nv; ++i) x_[i] = static_cast<S>(motion[i]);
+    }
+  }
   std::copy_n(x_.data(), nv, v);
 }
 

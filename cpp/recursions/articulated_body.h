@@ -2,16 +2,16 @@
 //
 //   tip to base:  P, D, G, P⁺ of algebra/trees/sweeps/articulated_inertia.h, and
 //                 z(k) = P(k) a(k) + b(k) - w(k) + Σ_{children c} E(k,c) z⁺(c)
-//                 ε(k) = T(k) - H(k) z(k),   ν(k) = D(k)⁻¹ ε(k),   z⁺(k) = z(k) + G(k) ε(k)
+//                 ε(k) = T(k) - c(k) - H(k) z(k),   ν(k) = D(k)⁻¹ ε(k),   z⁺(k) = z(k) + G(k) ε(k)
 //   base to tip:  α⁺(k) = E(p,k)* α(p),   θ̈(k) = ν(k) - G(k)* α⁺(k),   α(k) = α⁺(k) + H(k)* θ̈(k) + a(k),   α(base) = -g
 //
-// with w the wrench applied to the body (recursions/applied.h), and α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's.
+// with w the wrench applied to the body (recursions/applied.h), c that of rotors, and α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's.
 //
 // In the factored forms P = C W C* and z = y - C W ρ*: of the forces that go with an inertia only accelerations ρ of its columns are kept,
 // so that a heavy body's do not drown a light one's. Per body ρ(k) = -b(k) in its own columns, ρ⁺ what is left of ρ - a*C beside the
 // hinge's rows, and
 //
-//   ε(k) = T(k) - H(k) y(k),   ν(k) = D(k)⁻¹ (ε(k) + HC W ρ*),   y⁺(k) = y(k) + G(k) ε(k)
+//   ε(k) = T(k) - c(k) - H(k) y(k),   ν(k) = D(k)⁻¹ (ε(k) + HC W ρ*),   y⁺(k) = y(k) + G(k) ε(k)
 //
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the articulated-body forward dynamics algorithm. Cost O(N).
 #pragma once
@@ -61,7 +61,7 @@ S articulated_body(const SkoStructure& tree, const CompiledModel<S>& model, Rigi
     if (!factored) zk = zk + blocks.P[k] * points.a[k];
     Vector6<S> plus = zk;
     for (int j = first; j < first + n; ++j) {
-      const S epsilon = T[j] - dot(blocks.H[j], zk);
+      const S epsilon = points.without_rotors(j, T[j]) - dot(blocks.H[j], zk);
       plus = plus + epsilon * blocks.G[j];
       vdot[j] = epsilon;
     }

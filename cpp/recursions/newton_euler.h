@@ -1,9 +1,9 @@
 // Inverse dynamics (Newton-Euler), with gravity as the acceleration -g of the base:
 //
 //   base to tip:  α(k) = E(p,k)* α(p) + H(k)* θ̈(k) + a(k),   α(base) = -g
-//   tip to base:  f(k) = M(k) α(k) + b(k) - w(k) + Σ_{children c} E(k,c) f(c),   T(k) = H(k) f(k) + J(k) θ̈(k)
+//   tip to base:  f(k) = M(k) α(k) + b(k) - w(k) + Σ_{children c} E(k,c) f(c),   T(k) = H(k) f(k) + J(k) θ̈(k) + c(k)
 //
-// with w the wrench applied to the body (recursions/applied.h), and α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's. vdot is θ̈ + x
+// with w the wrench applied to the body (recursions/applied.h), c that of rotors, and α, a and b those of points (recursions/point_accelerations.h): the equations are the same for these and for the book's. vdot is θ̈ + x
 // where hinges absorb their own terms x. It may be null (zero): T is then the bias 𝒞 (Coriolis, gyroscopic and gravity forces).
 // Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the Newton-Euler inverse dynamics algorithm. Cost O(N).
 #pragma once
@@ -36,7 +36,7 @@ void newton_euler(const CompiledModel<S>& model, const RigidBlocks<S>& blocks, c
   for (int k = model.bodies - 1; k >= 0; --k) {
     check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
-    for (int j = first; j < first + n; ++j) T[j] = dot(blocks.H[j], f[k]) + (vdot ? blocks.J[j] * vdot[j] : S(0));
+    for (int j = first; j < first + n; ++j) T[j] = points.with_rotors(j, dot(blocks.H[j], f[k]) + (vdot ? blocks.J[j] * vdot[j] : S(0)));
     if (p >= 0) f[p] = f[p] + force_to_parent(blocks.pose[k], f[k]);
   }
 }
@@ -61,7 +61,7 @@ void newton_euler_residual_gathered(const CompiledModel<S>& model, const RigidBl
     check_interrupt_at(k);
     const int p = model.parent[k], first = model.v_offset[k], n = model.nv_of[k];
     f[k] = cast<S>(wide[k]);
-    for (int j = first; j < first + n; ++j) r[j] = static_cast<S>(T(tau[j]) - wide_dot(blocks.H[j], wide[k]) - T(blocks.J[j]) * T(vdot[j]));
+    for (int j = first; j < first + n; ++j) r[j] = static_cast<S>(T(tau[j]) - T(points.with_rotors(j, S(0))) - wide_dot(blocks.H[j], wide[k]) - T(blocks.J[j]) * T(vdot[j]));
     if (p >= 0) add_wide_to_parent(blocks.pose[k], wide[k], wide[p]);
   }
 }

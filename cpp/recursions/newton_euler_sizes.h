@@ -67,7 +67,7 @@ void newton_euler_sizes(const SkoStructure& tree, const CompiledModel<T>& model,
     const Vector6<S> total = size(f[k]);
     for (int j = model.v_offset[k]; j < model.v_offset[k] + model.nv_of[k]; ++j)
       out.coordinate[j] = (blocks.aligned[j] >= 0 ? units.force : units.motion) * dot(size(blocks.H[j]), total) +
-                          units.force * (S(abs(static_cast<S>(blocks.J[j] * vdot[j]))) + S(abs(tau[j])));
+                          units.force * (S(abs(static_cast<S>(blocks.J[j] * vdot[j]))) + S(abs(tau[j]))) + units.motion * S(abs(static_cast<S>(points.with_rotors(j, T(0)))));
     if (const int p = model.parent[k]; p >= 0)
       add_to((blocks.exact_pose(k) ? units.force : units.motion) * sizes::force_carried(size(blocks.pose[k]), total), out.force.data() + tree.offset[p], 1, 0);
   }

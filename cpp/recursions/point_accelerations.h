@@ -15,6 +15,8 @@
 // of its own a' is a motion of its coordinates t, (0; a'_linear) = Σ H_t* x_t: the equations of motion hold with that part left out for
 // accelerations θ̈ + x, and x is taken from them at the end. So it never meets a mass.
 //
+// With them go c(v) = v ×* (J v) of the hinges' rotors (model/rotor_forces.h), forces of the hinges' own coordinates: T = H f + J θ̈ + c.
+//
 // Sources: R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008 (spatial and classical acceleration); A. Jain, Robot and
 // Multibody Dynamics, Springer 2011, the equations-of-motion chapter. Cost O(N).
 #pragma once
@@ -22,6 +24,7 @@
 #include <vector>
 
 #include "model/compiled_model.h"
+#include "model/rotor_forces.h"
 #include "runtime/interrupt.h"
 #include "spatial/pose.h"
 
@@ -32,10 +35,15 @@ struct PointAccelerations {
   std::vector<Vector3<S>> angular_velocity;  // per body, in its axes
   std::vector<Vector6<S>> a, b;              // per body
   std::vector<S> absorbed;                   // per coordinate: x
-  void resize(int bodies, int coordinates) {
-    angular_velocity.resize(bodies), a.resize(bodies), b.resize(bodies);
-    absorbed.assign(coordinates, S(0));
+  std::vector<S> rotors;                     // per coordinate: c; empty: there are no rotors
+  void resize(const CompiledModel<S>& model) {
+    angular_velocity.resize(model.bodies), a.resize(model.bodies), b.resize(model.bodies);
+    absorbed.assign(model.nv, S(0));
+    rotors.assign(model.has_rotor_inertia ? model.nv : 0, S(0));
   }
+  // T - c and T + c of one coordinate.
+  S without_rotors(int j, const S& T) const { return rotors.empty() ? T : S(T - rotors[j]); }
+  S with_rotors(int j, const S& T) const { return rotors.empty() ? T : S(T + rotors[j]); }
 };
 
 // Whether hinges take up the linear part of their own a' where they can: for equations that are solved for θ̈.
@@ -55,7 +63,7 @@ inline Vector6<S> gyroscopic_part(const RigidInertia<S>& M, const Vector3<S>& om
   return {cross(omega, M.rotational * omega), cross(omega, cross(omega, M.moment))};
 }
 
-// ω, a', b' and x of body k from the angular velocity of its parent, in the parent's axes; null: the base.
+// ω, a', b', x and c of body k from the angular velocity of its parent, in the parent's axes; null: the base.
 template <class S>
 inline void point_acceleration(const CompiledModel<S>& model, int k, const Vector3<S>* parents, const Pose<S>* pose, const Vector6<S>* H, const S* v,
                                OwnTerms own, PointAccelerations<S>& out) {
@@ -82,12 +90,13 @@ inline void point_acceleration(const CompiledModel<S>& model, int k, const Vecto
   out.angular_velocity[k] = omega;
   out.a[k] = a;
   out.b[k] = gyroscopic_part(model.inertia[k], omega);
+  if (!out.rotors.empty()) rotor_forces(model, k, model.rotor_inertia.data(), v, out.rotors.data());
 }
 
 template <class S>
 void point_accelerations_base_to_tip(const CompiledModel<S>& model, const Pose<S>* pose, const Vector6<S>* H, const S* v, OwnTerms own,
                                      PointAccelerations<S>& out) {
-  out.resize(model.bodies, model.nv);
+  out.resize(model);
   for (int k = 0; k < model.bodies; ++k) {
     check_interrupt_at(k);
     const int p = model.parent[k];

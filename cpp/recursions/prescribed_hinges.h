@@ -1,7 +1,7 @@
 // Coordinates whose motion is prescribed taken out of the equations of motion (hybrid dynamics). With H_f the rows of H that are free and H_p
 // the others, and accelerations θ̈_p given,
 //
-//   α = φ*(H_f* θ̈_f + a'),  a' = a + H_p* θ̈_p,     T_f = H_f f,     T_p = H_p f + J_p θ̈_p
+//   α = φ*(H_f* θ̈_f + a'),  a' = a + H_p* θ̈_p,     T_f = H_f f,     T_p = H_p f + J_p θ̈_p + c_p
 //
 // so that every sweep runs unchanged on the tree whose hinges have the free coordinates alone, with a' in place of a: E_ψ, D, G, K and ψ are
 // those of H_f. A hinge all of whose coordinates are prescribed has no row left and is passed as a weld that moves: P⁺ = P.
@@ -84,6 +84,8 @@ class PrescribedHinges {
     point_accelerations_base_to_tip(*whole_, blocks.pose.data(), rows_.data(), v, own, points);
     for (const auto& [j, k] : prescribed_) points.a[k] = points.a[k] + rates_[j] * rows_[j];
     keep_free(points.absorbed);
+    rotors_ = points.rotors;
+    if (!rotors_.empty()) keep_free(points.rotors);
   }
   // Numbers of all coordinates: of the free ones, in place.
   void keep_free(std::vector<S>& of_all) const {
@@ -97,7 +99,7 @@ class PrescribedHinges {
   // θ̈_f and T_p by coordinate, f the forces of the hinges on their bodies.
   void give(const S* accelerations, const std::vector<Vector6<S>>& f, S* out) const {
     for (size_t i = 0; i < free_.size(); ++i) out[free_[i]] = accelerations[i];
-    for (const auto& [j, k] : prescribed_) out[j] = dot(rows_[j], f[k]) + whole_->rotor_inertia[j] * rates_[j];
+    for (const auto& [j, k] : prescribed_) out[j] = dot(rows_[j], f[k]) + whole_->rotor_inertia[j] * rates_[j] + (rotors_.empty() ? S(0) : rotors_[j]);
   }
 
  private:
@@ -108,7 +110,7 @@ class PrescribedHinges {
   std::vector<int> free_;
   std::vector<OnBody> prescribed_;
   std::vector<Vector6<S>> rows_;  // of all coordinates
-  std::vector<S> rates_;
+  std::vector<S> rates_, rotors_;  // rotors: c of all coordinates
 };
 
 }  // namespace pycraft

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/rotor_forces.h"
 #include "numerics/finite.h"
 #include "runtime/errors.h"
 
@@ -15,6 +16,16 @@ std::string plural(size_t n, const char* one, const char* several) { return std:
 template <class S>
 bool all_are_finite(const S* x, int n) {
   return std::all_of(x, x + n, [](const S& y) { return std::isfinite(to_double(y)); });
+}
+
+// c(v) of the rotors that an effect brings (model/rotor_forces.h).
+template <class S>
+void subtract_rotor_forces(const CompiledModel<S>& model, const std::vector<HingeTerm>& terms, const S* v, S* row) {
+  if (std::all_of(terms.begin(), terms.end(), [](const HingeTerm& h) { return h.inertia == 0; })) return;
+  std::vector<S> J(model.nv, S(0)), c(model.nv, S(0));
+  for (const HingeTerm& h : terms) J[h.coordinate] += S(h.inertia);
+  for (int k = 0; k < model.bodies; ++k) rotor_forces(model, k, J.data(), v, c.data());
+  for (int j = 0; j < model.nv; ++j) row[j] -= c[j];
 }
 
 }  // namespace
@@ -173,6 +184,7 @@ void CompiledScene<S>::add_structural_forces(const S* q, const S* vdot, S* rows)
       whole_model().inverse_dynamics(q, zeros_.data(), nullptr, work_.data(), &field);
       for (int j = 0; j < nv_; ++j) row[j] -= work_[j];
     }
+    if (v_) subtract_rotor_forces(numbers(), d.hinges, v_, row);
     for (const HingeTerm& h : d.hinges) row[h.coordinate] -= (S(h.inertia) + step_ * (S(h.damping) + step_ * S(h.stiffness))) * vdot[h.coordinate];
     for (int j : d.prescribed) row[j] += needed_[j];
     if (d.loops) loops_->add_forces(e->number, row);

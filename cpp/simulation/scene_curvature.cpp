@@ -4,15 +4,17 @@
 #include <cmath>
 
 #include "model/checks.h"
+#include "model/rotor_forces.h"
 #include "runtime/errors.h"
 #include "runtime/interrupt.h"
 
 namespace pycraft {
 
-SceneCurvature::SceneCurvature(CompiledScene<double>& scene) : scene_(scene), known_(scene.numbers().nv, 0), along_(scene.numbers().nv) {
+SceneCurvature::SceneCurvature(CompiledScene<double>& scene) : scene_(scene), known_(scene.numbers().nv, 0), along_(scene.numbers().nv), J_(scene.numbers().nv, 0.0) {
   for (const auto& e : scene.effects().effects()) {
     const Declaration& d = e->declared;
     if (d.uniform_gravity) gravity_ = gravity_ + d.gravity;
+    for (const HingeTerm& term : d.hinges) J_[term.coordinate] += term.inertia;
     acts_ |= e->acts() || !d.states.empty(), differenced_ |= !d.differentiable && (e->acts() || !d.states.empty());
   }
   for (int j : scene.prescribed()) known_[j] = 1;
@@ -136,6 +138,15 @@ void SceneCurvature::motion(const double* q, const double* v, const double* vdot
     for (int j = 0; j < N; ++j) weights.push_back(known_[j] ? 0.0 : mu[size_t(m) * rows + j]);
   if (N == 0 || count == 0) return;
   Curvature<double>(scene_.scene().model()).inverse_dynamics(q, v, vdot, weights.data(), count, out, &gravity_);
+  // And of the rotors that effects bring, whose c(v) is of second degree: along v_i the gradient at v = e_i.
+  const CompiledModel<double>& numbers = scene_.numbers();
+  for (int m = 0; m < count; ++m)
+    for (int k = 0; k < numbers.bodies; ++k)
+      for (int i = numbers.v_offset[k]; i < numbers.v_offset[k] + numbers.nv_of[k]; ++i) {
+        std::fill(along_.begin(), along_.end(), 0.0);
+        along_[i] = 1;
+        add_rotor_power_gradient(numbers, k, J_.data(), along_.data(), weights.data() + size_t(m) * N, out + size_t(Curvature<double>::blocks * m + 3) * N * N + size_t(i) * N);
+      }
   for (int block = 0; block < Curvature<double>::blocks * count; ++block, out += size_t(N) * N)
     for (int j = 0; j < N; ++j)
       for (int i = 0; known_[j] && i < N; ++i) out[j * N + i] = out[i * N + j] = 0;

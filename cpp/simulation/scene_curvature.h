@@ -46,7 +46,7 @@ class SceneCurvature {
   Vector3<double> gravity_{0, 0, 0};
   bool acts_ = false, differenced_ = false;
   std::vector<char> known_;
-  std::vector<double> along_, q_, v_, y_, F_;
+  std::vector<double> along_, q_, v_, y_, F_, J_;  // J: of rotors that effects bring
 };
 
 }  // namespace pycraft

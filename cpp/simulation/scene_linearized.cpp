@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/rotor_forces.h"
+
 namespace pycraft {
 
 SceneLinearized::SceneLinearized(CompiledScene<double>& scene, bool works)
@@ -50,6 +52,8 @@ void SceneLinearized::differentiate_motion(const double* q, const double* v, con
   for (int j = 0; j < N; ++j) out.mass(j, j) += J_[j];
   out.along_u.topRows(N) = -along_q_;
   out.along_z.topLeftCorner(N, N) = -along_v_;
+  for (int k = 0; k < scene().numbers().bodies; ++k)
+    each_rotor_force_rate(scene().numbers(), k, J_.data(), v, [&](int i, int j, double rate) { out.along_z(i, j) -= rate; });
 }
 
 // Direction: of a displacement, then of a velocity, then of a state of the effects.

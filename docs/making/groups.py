@@ -24,8 +24,10 @@ MULTIBODY = {
         "kinetic_energy_derivatives mass_matrix_derivative christoffel log_determinant_gradient linearize "
         "quadratic_model"
     ),
-    "Identification and statistics": "identify inertial_parameters inertial_regressor equipartition fixman_potential "
-    "fixman_torque dof_shares",
+    "Identification and statistics": (
+        "identify inertial_parameters inertial_regressor rotor_forces rotor_regressor equipartition fixman_potential "
+        "fixman_torque dof_shares"
+    ),
     "Loops": (
         "loops add_loop add_coupling add_curve add_rolling add_surface assemble assembly_branches mobility "
         "mobility_along constrained_dynamics constrained_velocities constrained_inverse_dynamics constrained_inverse_dynamics_derivatives"

@@ -17,22 +17,52 @@ BITS = 400
 """Working precision of the differences below, more than that of 100 digits."""
 
 
-def dynamics_expression(model: Any, tau: np.ndarray) -> _core.Operator:
-    """Accelerations as an expression, with gravity and Coriolis terms inside the sweeps.
+def dynamics_expression(model: Any, tau: np.ndarray, v: np.ndarray) -> _core.Operator:
+    """Accelerations at velocities v as an expression, with gravity and Coriolis terms inside the sweeps.
 
-    θ̈ = [I - HψK]* D⁻¹ (τ - Hψ(Kτ + P𝔞 + b)) - K*ψ*𝔞, 𝔞 = a + a₀ [Jain 2011, articulated-body forward dynamics].
+    θ̈ = [I - HψK]* D⁻¹ (T - Hψ(KT + P𝔞 + b)) - K*ψ*𝔞, 𝔞 = a + a₀ [Jain 2011, articulated-body forward dynamics]; T = τ less what
+    rotors of balls and free hinges take, v ×* (J v).
     """
     soa = model.soa
     H, psi, K, D, P, I, a, b, a0 = soa("H psi K D P I a b gravity_base")
-    T = _core.constant(np.asarray(tau, float)[:, None], _core.euclidean(1), soa.Theta, "τ")
+    forces = _core.constant(np.asarray(tau, float)[:, None], _core.euclidean(1), soa.Theta, "τ")
+    T = sum((_core.constant(part[:, None], _core.euclidean(1), soa.Theta, "c") for part in _rotor_forces(model, v)), forces)
     A = a + a0
     innovations = T - H @ psi @ (K @ T + P @ A + b)
     return (I - H @ psi @ K).T @ (D.inv() @ innovations) - K.T @ psi.T @ A
 
 
+def _rotor_forces(model: Any, v: np.ndarray) -> list[np.ndarray]:
+    """-v ×* (J v) of rotors on balls and free hinges: doubles (nv,), each of what the sum of those before has left."""
+    if not model.rotor_forces(v).any():
+        return []
+    parts = []
+    with mpmath.workprec(BITS):
+        left = np.concatenate([np.zeros(0, object), *(_of_hinge(hinge, v) for hinge in model.hinges.values())])
+        while any(left) and len(parts) < BITS // 53:
+            parts.append(np.array([float(x) for x in left]))
+            left = np.array([x - mpmath.mpf(part) for x, part in zip(left, parts[-1], strict=True)], object)
+    return parts
+
+
+def _of_hinge(hinge: Any, v: np.ndarray) -> np.ndarray:
+    numbers = lambda x: np.array([mpmath.mpf(float(y)) for y in x], object)
+    v, momentum = numbers(v[hinge.v_slice]), numbers(hinge.rotor_inertia) * numbers(v[hinge.v_slice])
+    out, at = numbers(np.zeros(len(v))), 0
+    for subhinge in hinge.subhinges:
+        turns, moves = slice(at, at + 3), slice(at + 3, at + 6)
+        if subhinge["kind"] in ("ball", "free"):
+            out[turns] = -np.cross(v[turns], momentum[turns])
+        if subhinge["kind"] == "free":
+            out[turns] = out[turns] - np.cross(v[moves], momentum[moves])
+            out[moves] = -np.cross(v[turns], momentum[moves])
+        at += _core.subhinge_kinds[subhinge["kind"]].nv
+    return out
+
+
 def exact_dynamics(model: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray, precision: Any, form: str = EXACT) -> np.ndarray:
     """Accelerations (nv,) as mpmath numbers in a wider precision, not rounded to double."""
-    return dynamics_expression(model, tau).at(q, v, form=form, precision=precision).dense(dtype=object)[:, 0]
+    return dynamics_expression(model, tau, v).at(q, v, form=form, precision=precision).dense(dtype=object)[:, 0]
 
 
 def dynamics_error(model: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray, rung: Rung, returned: np.ndarray, truth: np.ndarray) -> float:

@@ -109,6 +109,7 @@ def check(
     precision: Annotated[str, typer.Option(help="The first scalar beside double: extended | quad | 50 | 100 (digits).")] = "extended",
     every: Annotated[bool, typer.Option("--all", help="The long form: residuals, bounds, hypotheses and notes of every theorem.")] = False,
     json: Annotated[bool, typer.Option("--json", help="The report as JSON.")] = False,
+    dialect: Annotated[str | None, typer.Option(help="Of a paper: Featherstone | Khatib | Mueller | Park | Saha | Wensing.")] = None,
     root: Root = None,
     mimic: Mimic = "couple",
 ) -> None:
@@ -124,7 +125,7 @@ def check(
         for option, given in (("all", every), ("root", root is not None), ("mimic", mimic != "couple")):
             if given:
                 fail(f"--{option} belongs to models; a paper is checked on random trees, and shown in full")
-        _check_paper(model, states, seed, wide, json)
+        _check_paper(model, states, seed, wide, json, dialect)
     robot = load_model(model, root, mimic)
     with diagnostics.status("checking") as status:
         report = robot.soa.check(states=states, seed=seed, precision=wide, progress=lambda name: status.update(escape(name)))
@@ -136,11 +137,11 @@ def check(
     raise typer.Exit(report.status)
 
 
-def _check_paper(path: str, states: int, seed: int, precision: str | int, json: bool) -> None:
+def _check_paper(path: str, states: int, seed: int, precision: str | int, json: bool, dialect: str | None) -> None:
     from ..identities.paper import check_paper
 
     with diagnostics.status("reading") as status:
-        report = check_paper(path, states=max(states, 1), seed=seed, precision=precision, progress=status.update)
+        report = check_paper(path, states=max(states, 1), seed=seed, precision=precision, progress=status.update, dialect=dialect)
     print(report.to_json() if json else report)
     raise typer.Exit(report.status)
 

@@ -230,6 +230,16 @@ class Letters:
             raise _core.EvaluationError(f"the function {name!r} has no closed form here")
         return self._each(makers[name], x)
 
+    def _rotor_forces(self) -> Matrix:
+        """θ̇ ×* (Jθ̇): by subhinges ω̃ of a ball's rates, crf of a free one's, zero of one coordinate."""
+        x, at = self("theta_dot"), 0
+        blocks = []
+        for kind in (KINDS[s["kind"]] for b in self.parameters.bodies for s in b["subhinges"]):
+            part = x.block(slice(at, at + kind.nv), slice(0, 1))
+            blocks.append({3: skew, 6: crf}[kind.nv](part) if kind.nv > 1 else Matrix.zeros(x.field, 1, 1))
+            at += kind.nv
+        return Matrix.diagonal(x.field, blocks) @ self("J") @ x
+
     def _theta_dot(self) -> Matrix:
         return self._matrix([[x] for x in self.v], 1)
 
@@ -312,5 +322,5 @@ LETTERS: dict[str, Callable[..., Matrix]] = {
     "mass_matrix": lambda o: o("MM") + o("J"),
     "innovations": lambda o: Matrix.identity(o.field, len(o.v)) - o("H") @ o("psi") @ o("K"),
     "mass_matrix_inverse": lambda o: o("innovations").T @ o("D_inverse") @ o("innovations"),
-    "bias_forces": lambda o: o("H") @ o("phi") @ (o("M") @ o("phi").T @ (o("a") + o("gravity_base")) + o("b")),
+    "bias_forces": lambda o: o("H") @ o("phi") @ (o("M") @ o("phi").T @ (o("a") + o("gravity_base")) + o("b")) + o._rotor_forces(),
 }

@@ -12,8 +12,8 @@ from .. import _core
 def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarray:
     """Accelerations (nv,) or (B, nv) as (HφMφ*H* + J)⁻¹ (T - Hφ(Mφ*(a + a₀) + b)) evaluated as typed, no theorem used.
 
-    Equations of motion [Jain 2011, forward dynamics by the mass matrix], realized and eliminated: O(N³). Takes and refuses what the other
-    direct calls do; an error at one state of a batch says which.
+    Equations of motion [Jain 2011, forward dynamics by the mass matrix], realized and eliminated: O(N³). T is less what rotors of balls and
+    free hinges take, v ×* (J v). Takes and refuses what the other direct calls do; an error at one state of a batch says which.
     """
     q, v, tau, batch = motion_state(model, q, v, tau)
     result = output(out, (*batch, model.nv))  # filled at the end: it may lie in the memory of q, v or tau
@@ -22,7 +22,7 @@ def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarr
     H, phi, M, J, a, b, base = model.soa("H phi M J a b gravity_base")
     T = _core.vector("T", model.soa.Theta)
     formula = (H @ phi @ M @ phi.T @ H.T + J).inv() @ (T - H @ phi @ (M @ phi.T @ (a + base) + b))
-    states = [x.reshape(-1, x.shape[-1]) for x in (q, v, tau)]
+    states = [x.reshape(-1, x.shape[-1]) for x in (q, v, tau - model.rotor_forces(v))]
     flat = np.empty((len(states[0]), model.nv))
     for i in range(len(flat)):
         try:

@@ -124,7 +124,9 @@ class ConstrainedCalls:
             Arrays of another shape, not finite; a loop that has lost a body; alpha or beta below zero.
 
         Rows count as dependent where in units of their own, and of energy, less than √ε of them is left beside the others (in
-        "quad" 64 ε of a double: states are doubles); a row or an equation is missed from 64 times that of its largest term on.
+        "quad" 64 ε of a double: states are doubles); a row or an equation is missed from 64 times that of its largest term on, a row also
+        in its own units. Where that happens the state is solved in the next wider precision, up to "quad", and refused if it happens there;
+        couplings by functions of a user are in double alone and refused at once.
 
         Cost: O(N), O(depth) a row, and up to rows² · coordinates in each group; linear in loops
         that share hinges with a few others (docs/loops.md). By "embed" O(N), and n³ of loops that hang together around n coordinates.

@@ -13,7 +13,7 @@ from ..state import at_state
 def embedded_accelerations(model: Any, q: Any = None, v: Any = None, tau: Any = None, independent: Any = None, **how: Any) -> np.ndarray:
     """Accelerations (nv,) or (B, nv) of the model that keep its loops, forces of the loops doing no work.
 
-    With the letters of `soa.embedded(independent)`, X its coordinate map, f = X*τ:
+    With the letters of `soa.embedded(independent)`, X its coordinate map, f = X*(τ - v ×* (J v)) with the rotors':
 
         (ℳ + J)θ̈_r = f - Hφ(Mφ*(a + a₀) + b) - X*J Ẋθ̇_r,        θ̈ = Xθ̈_r + Ẋθ̇_r
 
@@ -59,7 +59,9 @@ def embedded_accelerations(model: Any, q: Any = None, v: Any = None, tau: Any = 
         return np.zeros((*batch, model.nv))
     if batch:
         q, v = np.broadcast_to(q, (*batch, model.nq)), np.broadcast_to(v, (*batch, model.nv))
-    return EmbeddedDynamics(model.soa.embedded(independent, q if q.ndim == 1 else q[0])).accelerations(q, v, tau, **how)
+    return EmbeddedDynamics(model.soa.embedded(independent, q if q.ndim == 1 else q[0])).accelerations(
+        q, v, tau - model.rotor_forces(v), **how
+    )
 
 
 class EmbeddedDynamics:

@@ -56,7 +56,7 @@ class Identification:
     Attributes
     ----------
     parameters : (10 n,) in the order of `Multibody.inertial_parameters`, those that were not asked for as the model has them
-    rotor_inertia, viscous, coulomb : (nv,) J, c and F of T = Y π + J v̇ + c v + F sign(v), the first as the model has it where not asked for
+    rotor_inertia, viscous, coulomb : (nv,) J, c, F of T = Y π + Y_J J + c v + F sign(v), the first as the model has it where not asked for
     base : what can be told, by name, with standard errors of least squares
     condition : of the base columns, each of unit length
     consistent : whether all are parameters of bodies (pseudo-inertias positive, scalars not negative)
@@ -88,7 +88,8 @@ class Identification:
         given = (("v", v), ("vdot", np.zeros(self.model.nv) if vdot is None else vdot))
         v, vdot = (np.asarray(_core.real_array(x, name), float) for name, x in given)
         forces = self.model.inertial_regressor(q, v, vdot) @ self.parameters
-        return forces + self.rotor_inertia * vdot + self.viscous * v + self.coulomb * np.sign(v)
+        forces = forces + self.model.rotor_regressor(v, vdot) @ self.rotor_inertia
+        return forces + self.viscous * v + self.coulomb * np.sign(v)
 
     def apply(self) -> Any:
         """Gives the model these bodies and rotors; returns it. Friction is an effect's: `pc.effects.Damping(found.viscous)`.
@@ -140,7 +141,7 @@ class IdentificationCalls:
         self, q=None, v=None, vdot=None, tau=None, *, bodies: Any = None, rotors: Any = None, viscous: Any = None, coulomb: Any = None,
         consistent: bool = True, regularizer: str = "metric", regularization: float = 1e-3, noise: Any = None, apply: bool = False,
     ) -> Identification:  # fmt: skip
-        """Inertial parameters of bodies from logged motion and forces, T = Y(q, v, v̇) π + J v̇ + c v + F sign(v).
+        """Inertial parameters of bodies from logged motion and forces, T = Y(q, v, v̇) π + Y_J J + c v + F sign(v).
 
         What T tells are combinations of parameters, the base ones, found by least squares; among all parameters with these the ones that
         are nearest to the model's present ones are taken, which are the prior. Where they are not those of bodies (a negative mass, an
@@ -152,7 +153,8 @@ class IdentificationCalls:
 
         Parameters
         ----------
-        q, v, vdot, tau : (K, nq), (K, nv), (K, nv), (K, nv), forces as `inverse_dynamics` gives them, J v̇ and friction included
+        q, v, vdot, tau : (K, nq), (K, nv), (K, nv), (K, nv), forces as `inverse_dynamics` gives them
+            Those of rotors, Y_J J (`rotor_regressor`), and friction included.
             Or q alone: a run, or a table of one (`Run.to_dataframe`, columns "q.elbow", "v.elbow", "vdot.elbow"), with `tau` the names
             of the effects whose forces were measured; of a table None: columns "tau.elbow".
         bodies : names, or a list of them, whose parameters are looked for; None: all
@@ -255,7 +257,8 @@ class _Unknowns:
         K, n = v.shape
         Y = np.asarray(model.inertial_regressor(q, v, vdot)).reshape(K, n, len(model.bodies), 10)
         columns = [Y[:, :, self.bodies].reshape(K, n, 10 * len(self.bodies))]
-        for those, x in ((self.rotors, vdot), (self.viscous, v), (self.coulomb, np.sign(v))):
+        columns.append(np.asarray(model.rotor_regressor(v, vdot))[:, :, self.rotors])
+        for those, x in ((self.viscous, v), (self.coulomb, np.sign(v))):
             each = np.zeros((K, n, len(those)))
             each[:, those, range(len(those))] = x[:, those]
             columns.append(each)
@@ -268,7 +271,7 @@ class _Unknowns:
         J = _rotors_of(model)
         J[self.rotors] = 0.0
         others = np.asarray(model.inertial_regressor(q, v, vdot)) @ pi.ravel() if pi.any() else 0.0
-        return others + J * vdot
+        return others + np.asarray(model.rotor_regressor(v, vdot)) @ J
 
     def prior(self, model: Any) -> np.ndarray:
         pi = model.inertial_parameters().reshape(-1, 10)[self.bodies].ravel()

@@ -47,7 +47,8 @@ class InterbodyCalls:
 
         f(k) = M(k) α(k) + b(k) - w(k) + Σ_{children c} E(k,c) f(c), by Newton-Euler from the tips, after the accelerations that are given,
         or found by forward dynamics under `tau`, of the tree: what closes loops is among `wrenches` (docs/interbody_forces.md). Along its
-        own coordinates a hinge carries what drives it, H f + J v̇ = τ; across them, what holds the bodies together.
+        own coordinates a hinge carries what drives it, H f + J v̇ + v ×* (J v) = τ with J the rotors'; across them, what holds the bodies
+        together.
 
         Parameters
         ----------

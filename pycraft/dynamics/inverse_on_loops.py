@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from ..arguments import of_state
 from ..state import at_state
 from .constrained import LoopForce, by_loop
 from .equilibrium import TOLERANCE, checked_tolerance
@@ -262,14 +263,14 @@ class ConstrainedInverseCalls:
             along = model.inverse_dynamics_derivatives(q, v, vdot)
         Q = self.loops.jacobian(q)
         if not batch:
-            return ConstrainedForceDerivatives(*_derivatives(model, q, Q, needed, along, driven, ""))
+            return ConstrainedForceDerivatives(*_derivatives(model, q, Q, needed, along, driven))
         states = len(needed)
         given = [np.broadcast_to(x, (states, *x.shape[-axes:])) for x, axes in ((q, 1), (Q, 2), (needed, 1))]
         parts = [np.broadcast_to(x, (states, *x.shape[-2:])) for x in along]
         each = []
         for b, (own_q, own_Q, own) in enumerate(zip(*given, strict=True)):
-            told = f" (state {b} of a batch of {states})" if states > 1 else ""
-            each.append(_derivatives(model, own_q, own_Q, own, [part[b] for part in parts], driven, told))
+            with of_state(b, states):
+                each.append(_derivatives(model, own_q, own_Q, own, [part[b] for part in parts], driven))
         stacked = [np.stack(one) for one in zip(*each, strict=True)] if each else [np.zeros((0, self.nv, self.nv))] * 3
         return ConstrainedForceDerivatives(*stacked)
 
@@ -294,7 +295,7 @@ def _motion(model: Any, q: Any, v: Any, vdot: Any) -> tuple[np.ndarray, np.ndarr
 
 
 def _derivatives(
-    model: Any, q: np.ndarray, Q: np.ndarray, needed: np.ndarray, along: Any, driven: np.ndarray, told: str
+    model: Any, q: np.ndarray, Q: np.ndarray, needed: np.ndarray, along: Any, driven: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     nv = model.nv
     found = shared_out(Q, needed, driven)
@@ -303,7 +304,7 @@ def _derivatives(
         names = [model.coordinate_names[j] for j in np.flatnonzero(driven)]
         raise _core.EvaluationError(
             f"{model.name!r}: forces at {', '.join(map(repr, names)) or 'no coordinate'} drive {int(found.driven)} of {free} freedoms "
-            f"on its loops, and have no derivatives{told}; actuate {free - int(found.driven)} more (mobility(q) has the freedoms)"
+            f"on its loops, and have no derivatives; actuate {free - int(found.driven)} more (mobility(q) has the freedoms)"
         )
     _, sigma, V = np.linalg.svd(Q / (np.linalg.norm(Q, axis=1).max(initial=0.0) or 1.0)) if Q.size else (None, np.zeros(0), np.eye(nv))
     N = V[int((sigma > RANK).sum()) :].T

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import of_state
 from ..linear.linear_model import LinearModel, names_of_states, stacked
 from .linearization import linear_model, listed
 from .loop_tangents import KeptRows, TreeDerivatives, kept_rows, on_loops
@@ -67,8 +68,9 @@ def linearize_on_loops(
         raise _core.ModelError("a linear model of no states: q has no rows")
     given = [np.broadcast_to(x, (*batch, x.shape[-1])) for x in (q, v, tau)]
     each: list[LinearModel] = []
-    for one_q, one_v, one_tau in zip(*given, strict=True):
-        each.append(_at(model, one_q, one_v, one_tau, chosen, names, outputs, numbers, how))
+    for b, (one_q, one_v, one_tau) in enumerate(zip(*given, strict=True)):
+        with of_state(b, batch[0]):
+            each.append(_at(model, one_q, one_v, one_tau, chosen, names, outputs, numbers, how))
         numbers = numbers or chosen_numbers(each[0])
     return stacked(each)
 

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _core
 from ..arguments import chosen, text
 from ..state import at_state
-from .by_realization import motion_state, output
+from .by_realization import checked_forces, motion_state, output
 from .direct_calls import cached
 from .operational_space import OperationalSpaceCalls
 from .prepared import direct, direct_of
@@ -94,7 +94,8 @@ class SensitivityCalls(OperationalSpaceCalls):
         """Christoffel symbols of the first kind Γ (nv, nv, nv): Σ_jk Γ(i,j,k) v_j v_k is the Coriolis force, and Σ_k Γ(i,j,k) v_k = C(i,j).
 
         Γ(i,j,k) = ½(∂_kℳ(i,j) + ∂_jℳ(i,k) - ∂_iℳ(j,k)), and on ball and free hinges the brackets of the quasi-velocities besides (Koszul).
-        Γ(i,j,k) - Γ(i,k,j) is the bracket's: zero for coordinates. Rotor inertias are constant and add nothing.
+        Γ(i,j,k) - Γ(i,k,j) is the bracket's: zero for coordinates. Of rotors, whose
+        inertias are constant, there are the brackets alone.
         """
         q, _ = at_state(self, q)
         return self._sensitivities().third_order(True, q, precision, out)
@@ -105,6 +106,9 @@ class SensitivityCalls(OperationalSpaceCalls):
         self, q=None, v=None, *, form: str = "christoffel", precision: str | int = "double", threads: int = 1, out=None
     ) -> np.ndarray:
         """C (nv, nv) with C v the Coriolis and gyroscopic forces (gravity apart) and ℳ̇ - 2C skew. Cost O(N · depth).
+
+        Rotors of balls and free hinges, whose momentum is Jv, add S with S_ij = (Jv)·[e_i, e_j] to the second, and to the first
+        ½(J ad_v - ad_v*J + S): Christoffel's of ℳ + J.
 
         form="christoffel": C = Hφ(M𝒥̇ + ½(𝓑 + V̄M + MṼ)𝒥) = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each;
         "skew": C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's.
@@ -120,10 +124,22 @@ class SensitivityCalls(OperationalSpaceCalls):
         J_dot = phi.T @ (turning.T @ self.soa.phi_tilde.T @ H.T + H_dot.T)  # type: ignore[attr-defined]  # the model's
         C = H @ phi @ (M @ J_dot + cross @ J)
         q, v, *_ = motion_state(self, q, v, np.zeros(self.nv))  # one of them may be shared by the batch
-        found = C.at(q, v, precision=precision).dense()
+        found = C.at(q, v, precision=precision).dense() + self._rotor_coriolis(v, False)
         result = output(out, found.shape)
         result[...] = found
         return result
+
+    def rotor_forces(self, v=None) -> np.ndarray:
+        """v ×* (J v) of rotors on balls and free hinges, (nv,) or (B, nv): what they ask for at zero acceleration (docs/conventions.md)."""
+        v = at_state(self, None, v)[1]
+        if not self.has_rotor_inertia:  # type: ignore[attr-defined]  # the model's
+            return np.zeros(np.shape(v))
+        J = np.concatenate([np.zeros(0), *map(_without_spheres, self.hinges.values())])  # type: ignore[attr-defined]  # the model's
+        return self.rotor_regressor(v, np.zeros(self.nv)) @ J
+
+    def _rotor_coriolis(self, v: np.ndarray, christoffel: bool) -> np.ndarray:
+        """What rotors add to C at velocities (..., nv), (..., nv, nv)."""
+        return self._sensitivities().rotor_coriolis(_states(v), christoffel).reshape(*v.shape, self.nv)
 
     @over_threads
     def kinetic_energy_derivatives(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -178,7 +194,12 @@ class SensitivityCalls(OperationalSpaceCalls):
         rest = np.zeros(self.nv)
         forces = tau - self.bias_forces(q, rest, precision=precision)
         bound = {"precision": precision}
-        return m.T.at(q, v, **bound) @ v, S.at(q, v, **bound).dense(), inverse.at(q, v, **bound) @ forces
+        turned, scaled = S.at(q, v, **bound).dense(), inverse.at(q, v, **bound)
+        rotors = self._rotor_coriolis(v, True)
+        if rotors.any():
+            dense = scaled.dense()
+            turned = turned + dense @ rotors @ np.swapaxes(dense, -1, -2)
+        return m.T.at(q, v, **bound) @ v, turned, scaled @ forces
 
     @over_threads
     def momentum(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> Momentum:
@@ -201,7 +222,7 @@ class SensitivityCalls(OperationalSpaceCalls):
 
     @over_threads
     def inertial_regressor(self, q=None, v=None, vdot=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + J v̇, gravity included. Cost O(N · depth).
+        """Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + Y_J J, gravity included, Y_J that of rotors. Cost O(N · depth).
 
         π holds ten numbers per body, in the bodies' order (`inertial_parameters`): mass, mass times centre of mass (3), rotational inertia
         about the body's origin (xx, xy, xz, yy, yz, zz).
@@ -209,6 +230,26 @@ class SensitivityCalls(OperationalSpaceCalls):
         q, v = at_state(self, q, v)
         vdot = np.zeros(self.nv) if vdot is None else vdot
         return self._sensitivities().inertial_regressor(q, v, vdot, precision)
+
+    def rotor_regressor(self, v=None, vdot=None) -> np.ndarray:
+        """Y_J (nv, nv) or (B, nv, nv) with inverse_dynamics = Y π + Y_J J, J (nv,) the rotor inertias: J v̇ + v ×* (J v).
+
+        On hinges of one coordinate each it is diag(v̇); on balls and free hinges v ×* (J v) is added (docs/conventions.md).
+
+        Examples
+        --------
+        >>> import pycraft as pc
+        >>> gyroscope = pc.tree([-1], ["ball"])
+        >>> gyroscope.rotor_regressor(v=[1.0, 2.0, 0.0]) @ [0.0, 0.0, 1.0]  # ω × Jω without a turn of the third rotor
+        array([0., 0., 0.])
+        >>> gyroscope.rotor_regressor(v=[1.0, 2.0, 0.0]) @ [1.0, 3.0, 0.0]  # (0, 0, (J₂ - J₁) ω₁ω₂)
+        array([0., 0., 4.])
+        """
+        v = at_state(self, None, v)[1]
+        vdot = np.zeros(self.nv) if vdot is None else vdot
+        arrays = np.broadcast_arrays(*(checked_forces(self, x, name) for x, name in ((v, "v"), (vdot, "vdot"))))
+        rows = [_states(x) for x in arrays]
+        return self._sensitivities().rotor_regressor(*rows).reshape(*arrays[0].shape, self.nv)
 
     def inertial_parameters(self) -> np.ndarray:
         """π (10 n,) of the regressor, from the bodies' present mass properties."""
@@ -227,3 +268,18 @@ class SensitivityCalls(OperationalSpaceCalls):
         """
         q, _ = at_state(self, q)
         return self._sensitivities().log_determinant(chosen(over, "over"), q, precision)
+
+
+def _states(x: np.ndarray) -> np.ndarray:
+    """(B, n) of (..., n)."""
+    return np.ascontiguousarray(x, float).reshape(int(np.prod(x.shape[:-1])), x.shape[-1])
+
+
+def _without_spheres(hinge: Any) -> np.ndarray:
+    """Rotor inertias of a hinge less the first rotor's of all three turns of a ball or free subhinge, which no v ×* sees."""
+    J, at = np.array(hinge.rotor_inertia), 0
+    for size in (_core.subhinge_kinds[subhinge["kind"]].nv for subhinge in hinge.subhinges):
+        if size > 1:
+            J[at : at + 3] -= J[at]
+        at += size
+    return J

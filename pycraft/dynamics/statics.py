@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import switch
+from ..arguments import of_state, switch
 from ..state import at_state
 from .equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from .equilibrium_on_loops import solved_on_loops
@@ -120,7 +120,11 @@ class StaticsCalls:
         if not states:
             return one(starts, given, numbers)
         rows = [np.broadcast_to(x, (states[0], *x.shape[-axes:])) for x, axes in ((starts, 1), (given, 1), (numbers, 2))]
-        return [one(*each) for each in zip(*rows, strict=True)]
+        found = []
+        for b, each in enumerate(zip(*rows, strict=True)):
+            with of_state(b, states[0]):
+                found.append(one(*each))
+        return found
 
     def counterbalance(
         self, q=None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", actuated: Any = None,

@@ -17,7 +17,8 @@ from functools import lru_cache
 
 from ..formula_nodes import parts
 from .block_relations import Relation, relations
-from .definitions import Definition, parted
+from .definitions import Definition, shown_text
+from .dialects import divided
 from .formula import INDEXED, Formula, Letter, Node, Power, rebuilt, starred, written
 from .formula_reading import LETTERS, Book
 from .spelling import Spelled, spelled
@@ -58,8 +59,13 @@ class BlockStatement:
     @property
     def understood(self) -> str:
         """How it was read."""
-        meant = ", ".join([*map(str, self.relations), *(d.typed for d in self.definitions)])
+        meant = ", ".join(
+            [*map(str, self.relations), *(f"{d.name} := {shown_text(d.what)}" for d in self.definitions if self._uses(d.name))]
+        )
         return " = ".join(map(shown, self.formula)) + (f", {meant}" if meant else "")
+
+    def _uses(self, name: str) -> bool:
+        return any(isinstance(node, Letter) and node.name == name for side in self.formula for node in parts(side))
 
     def beside(self, what: str) -> set[str]:
         """The letters of bodies of which the parent, or the child, is spoken of: bodies that have one."""
@@ -83,7 +89,7 @@ def is_by_block(text: str, bodies: Iterable[str] = (), own: Iterable[str] = ()) 
 def says_by_block(text: str, bodies: Iterable[str] = ()) -> bool:
     """`is_by_block`, of a statement with the definitions around it."""
     named = [*bodies]
-    definitions, claim = parted(text, lambda said, own: is_by_block(said, named, own))
+    definitions, claim = divided(text, lambda said, own: is_by_block(said, named, own))
     return is_by_block(claim, named, [d.name for d in definitions])
 
 
@@ -91,20 +97,21 @@ def refuse_by_block(text: str, own: Iterable[str] = ()) -> None:
     """Raises ParseError for a statement by block: what reads operators alone says so."""
     if is_by_block(text, own=own):
         raise ParseError(
-            f"{text!r} is a statement by block: pycraft.check evaluates it for every choice of bodies; statements by block are checked, "
-            "and not proved, mapped or repaired"
+            f"{text!r} is a statement by block: pycraft.check evaluates it for every choice of bodies, pycraft.prove derives those of "
+            "every body, its parent and its children; statements by block are not mapped or repaired"
         )
 
 
-def read_by_block(text: str, bodies: Iterable[str] = ()) -> BlockStatement:
-    """The statement.
+def read_by_block(text: str, bodies: Iterable[str] = (), before: Iterable[Definition] = ()) -> BlockStatement:
+    """The statement; `before` are definitions that do not stand in the text.
 
     Raises
     ------
     ParseError
         It does not read as one; the place is shown.
     """
-    definitions, claim = parted(text, lambda said, own: is_by_block(said, bodies, own))
+    definitions, claim = divided(text, lambda said, own: is_by_block(said, bodies, own))
+    definitions = [*before, *definitions]
     own = frozenset(d.name for d in definitions)
     said, meant = _divided(claim)
     source = spelled(said)
@@ -166,7 +173,7 @@ def _block(bodies: tuple[str, ...], defined: frozenset[str] = frozenset()) -> re
 
     own = (rf"'?\"?{re.escape(name)}'?\"?(?!\w)" for name in sorted(bodies, key=len, reverse=True))
     body = "|".join([re.sub(r"\?P<\w+>", "?:", _PARENT), rf"{VARIABLE}(?!\w)", *own])
-    letters = (LETTERS | defined) - {"I", "N"}
+    letters = LETTERS - {"I", "N"} | defined
     names = "|".join((r"(?<![A-Za-z])" if n in GUARDED else "") + re.escape(n) for n in sorted(letters, key=lambda n: (-len(n), n)))
     passed = "|".join(re.escape(n) for n in (*FUNCTIONS, *INDEXED))
     return re.compile(

@@ -86,14 +86,18 @@ class Blocks:
 
     def of(self, letter: Letter, bodies: dict[str, int]) -> Block:
         """The block of a letter; raises ParseError where it has none."""
-        if letter.name == "I":
+        defined = {d.name for d in self._definitions}
+        if letter.name == "I" and "I" not in defined:
             return Block(np.ones((1, 1)), ANY, ANY)
-        if letter.name == "N":
+        if letter.name == "N" and "N" not in defined:
             return Block(np.asarray(float(self._operators.Theta.dimension)), None, None)
         operator, array, error = self._matrix(letter.name)
         arguments, vector = letter.arguments, operator.domain.name == "R^1"
         if not arguments:
             return Block(array, (operator.codomain.name, ""), None if vector else (operator.domain.name, ""), error)
+        if len(arguments) == 1 and not vector and operator.domain.name == "Θ" and not operator.is_block_diagonal:
+            rows = _part(operator.codomain, self._body(arguments[0], bodies), letter)  # J(k): how body k moves with all hinges
+            return Block(array[rows], (operator.codomain.name, arguments[0]), (operator.domain.name, ""), error)
         if len(arguments) == 1 and not vector:
             if not operator.is_block_diagonal:
                 raise ParseError(f"{shown(letter)}: {operator.text()} has blocks between two bodies, {operator.text()}(i,j)")

@@ -14,6 +14,7 @@ from ..operators.operator_set import OperatorSet
 from ..progress_bar import StepProgress
 from .block_check import check_by_block
 from .block_reading import says_by_block
+from .dialects import in_dialect
 from .drawn_vectors import drawn_vectors
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
 from .parse import Statement, Statements, check_has_space
@@ -129,6 +130,7 @@ def check(
     search: bool = True,
     precision: str | int = "extended",
     budget: float = 5.0,
+    dialect: str | None = None,
 ) -> CheckReport:
     """Check a statement numerically: on a model over many seeded states, or on random trees.
 
@@ -149,6 +151,8 @@ def check(
     precision : the first scalar beside double in which residuals are taken, "extended", "quad", 50 or 100 digits. Where it does not decide,
         the wider ones are tried in turn: extended costs about twice a run in double, quad 20, 50 digits 60 and 100 digits 100 times.
         Numbers in the statement that are near each other, or near 0 or 1 (1e-40), ask for one that tells them apart.
+    dialect : the school in whose letters the text is written: "Featherstone", "Khatib", "Mueller", "Park", "Saha" or "Wensing". The text
+        may say so itself: ``"dialect Park; M = S^T G^T J G S"``.
     budget : CPU seconds for each part of that search: where it is true, and the smallest refutation. The report says where it ended one.
 
     Returns
@@ -179,7 +183,7 @@ def check(
     if isinstance(statement, (tuple, list)) and len(statement) == 2 and all(map(_is_expression, statement)):
         text = f"{statement[0].text()} == {statement[1].text()}"
     elif isinstance(statement, str):
-        text = statement
+        text = statement = in_dialect(statement, dialect)
     else:
         raise _core.EvaluationError(f"check takes a statement as text or a pair of expressions, not {statement!r:.80}")
     operators: Any = None if model is None else getattr(model, "soa", model)

@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import _core
 from .spelling import GREEK, spelled
+from .standard_letters import STANDARD
 from .vocabulary import ParseError, is_known
 
 _SPACE = r"Θ|Theta|\\Theta|\\mathcal\s*\{?\s*V\s*\}?|𝒱|V|F|R\^?\d*"
@@ -27,11 +28,16 @@ _BEHIND = re.compile(r"(?:\b(?:where|with|and)\b|(?<!\\)[,;]|\\q?quad(?![A-Za-z]
 
 @dataclass(frozen=True)
 class Definition:
-    """A letter: its name in the grammar's spelling, what it stands for, and both as they were typed."""
+    """A letter: its name in the grammar's spelling, what it stands for, and both as they were typed.
+
+    `others` are further meanings, where the spaces choose one; `of_the_book` says that it is defined by letters of the book alone.
+    """
 
     name: str
     what: str
     typed: str
+    others: tuple[str, ...] = ()
+    of_the_book: bool = False
 
 
 def letter_name(typed: str) -> str:
@@ -118,6 +124,15 @@ def _behind(part: str, signs: Iterable[str]) -> Definition | None:
     return None
 
 
+def shown_text(what: str) -> str:
+    """The text of a definition as it is shown: the table's letters for the grammar's names."""
+    text = re.sub(r"\s+", " ", re.sub(r"[A-Za-z_]+", lambda m: _SHOWN.get(m[0], m[0]), spelled(what).text)).strip()
+    return re.sub(r" ?\^\*(?: (?=[)\]]))?", "*", text)
+
+
+_SHOWN = {s.name: s.text for s in _core.symbols} | {n: known.text for n, known in STANDARD.items()} | {"MM": "ℳ", "vdot": "θ̈"}
+
+
 def drawn(seed: int = 0) -> Callable[[str, Any], Any]:
     """Vectors of random numbers as operators that have them, by name and space: for what takes no vectors whose numbers are given later."""
 
@@ -128,10 +143,13 @@ def drawn(seed: int = 0) -> Callable[[str, Any], Any]:
     return vector
 
 
-def meant(
-    made: Definition, operators: Any, read: Callable[[str], Any], vector: Callable[[str, Any], Any] = _core.vector
-) -> tuple[Any, bool]:
-    """(what a letter stands for on a model, whether nothing is known of it but its spaces); `read` makes an expression of text.
+def is_map(made: Definition) -> bool:
+    """Whether a letter is an operator of which nothing is known but its spaces."""
+    return _MAP.match(made.what) is not None
+
+
+def meant(made: Definition, operators: Any, read: Callable[[str], Any], vector: Callable[[str, Any], Any] = _core.vector) -> Any:
+    """What a letter stands for on a model; `read` makes an expression of text.
 
     Raises
     ------
@@ -139,12 +157,12 @@ def meant(
         A space that the model has not; text that is no expression.
     """
     if (found := _VECTOR.match(made.what)) is not None:
-        return vector(made.name, _space(found[1], operators)), False
+        return vector(made.name, _space(found[1], operators))
     if (found := _MAP.match(made.what)) is not None:
         domain, codomain = _space(found[1], operators), _space(found[2], operators)
         rng = np.random.default_rng([*made.name.encode()])
-        return _core.constant(rng.uniform(-1, 1, (codomain.dimension, domain.dimension)), domain, codomain, made.name), True
-    return read(made.what), False
+        return _core.constant(rng.uniform(-1, 1, (codomain.dimension, domain.dimension)), domain, codomain, made.name)
+    return read(made.what)
 
 
 def _space(name: str, operators: Any) -> Any:

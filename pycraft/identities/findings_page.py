@@ -78,10 +78,14 @@ def report_html(report: Any) -> str:
 
 
 def statement_html(report: Any) -> str:
-    """A `CheckReport`: the verdict, the statement, and what is said below it."""
+    """A `CheckReport`: verdict, statement and what is said below; on random trees, what hypotheses make true has its own sign."""
+    from .truth import in_words
+
     details = "".join(f'<div style="white-space:pre-wrap">{escape(line.strip())}</div>' for line in report.details())
     statement = "<br>".join(map(formula_html, report.statement.split("\n")))
-    return _CARD.format(f"{verdict_html(report.verdict)}<div>{statement}</div>{_SMALL.format(details)}")
+    where = ", or where ".join(map(in_words, report.true_where)) if report.verdict == "fails" and len(report.models) > 1 else ""
+    verdict = verdict_html("true where", f"true where {where}") if where else verdict_html(report.verdict)
+    return _CARD.format(f"{verdict}<div>{statement}</div>{_SMALL.format(details)}")
 
 
 def _row(found: Any) -> str:

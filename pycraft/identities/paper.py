@@ -20,6 +20,7 @@ from typing import Any
 from .. import _core
 from .block_reading import says_by_block
 from .definitions import Definition, is_letter, letter_name, pieces
+from .dialects import dialects
 from .family import Spec
 from .parse import Statements
 from .spelling import spelled
@@ -120,6 +121,7 @@ def check_paper(
     search: bool = True,
     precision: str | int = "extended",
     progress: Callable[[str], None] | None = None,
+    dialect: str | None = None,
 ) -> PaperReport:
     """Check every displayed equation of a LaTeX file numerically.
 
@@ -129,6 +131,7 @@ def check_paper(
     model : Multibody or OperatorSet; random trees of all hinge kinds where left out
     states, seed, search, precision : as `pycraft.check` has them
     progress : called with the line of each equation, if given
+    dialect : the school in whose letters it is written, see `pycraft.check`
 
     Raises
     ------
@@ -140,11 +143,11 @@ def check_paper(
     from .checker import check, check_wider
 
     def checked(text: str) -> Any:
-        return check(text, model, states=states, seed=seed, search=search, precision=precision)
+        return check(text, model, states=states, seed=seed, search=search, precision=precision, dialect=dialect)
 
     check_wider(precision)
     statements = [Said(line, *pair) for line, latex in equations(_read(Path(path))) for pair in _sides(latex)]
-    letters = _Letters(statements, model, checked)
+    letters = _Letters(statements, model, checked, dialect)
     found: list[Equation] = []
     for said in statements:
         if progress is not None:
@@ -195,16 +198,18 @@ def _chain(row: str) -> list[tuple[str, str]]:
 class _Letters:
     """The letters that a paper defines, and by which of its statements."""
 
-    def __init__(self, statements: Sequence[Said], model: Any, check: Callable[[str], Any]):
+    def __init__(self, statements: Sequence[Said], model: Any, check: Callable[[str], Any], dialect: str | None = None):
         self.definitions: dict[Said, Equation] = {}
         self._made: list[tuple[Said, Definition]] = []
+        school = [] if dialect is None else [*dialects()[dialect].definitions]
+        known = {d.name for d in school}
         for said in statements:
             if not said.rhs or not is_letter(said.lhs):
                 continue
             name = letter_name(said.lhs)
             told = said.sign in _DEFINITIONS
             if (
-                is_known(name)
+                (is_known(name) or name in known)
                 and not (told and not self._holds(said.text, check))
                 or not told
                 and any(d.name == name for _, d in self._made)
@@ -214,7 +219,7 @@ class _Letters:
         operators = getattr(model if model is not None else Spec((-1, 0), ("pin", "pin"), True, 1).model(), "soa", model)
         for said, made in self._made:
             try:
-                Statements(operators).letter(made.name, [d for s, d in self._made if s == said or d.name != made.name])
+                Statements(operators).letter(made.name, [*school, *(d for s, d in self._made if s == said or d.name != made.name)])
             except (_core.Error, ArithmeticError, TypeError, ValueError) as error:
                 self.definitions[said] = Equation(said.line, said.text, NOT_READ, note=str(error).split("\n", 1)[-1])
             else:

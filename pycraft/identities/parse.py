@@ -19,10 +19,10 @@ from typing import Any
 from .. import _core
 from .block_reading import is_by_block, refuse_by_block
 from .book import read_book
-from .definitions import Definition, meant, parted
+from .definitions import Definition, meant, shown_text
 from .determinant_equations import as_logarithms
+from .dialects import divided
 from .spelling import Spelled, spelled
-from .standard_letters import STANDARD
 from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, is_operator, power
 
 __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
@@ -65,15 +65,16 @@ class Statements:
         self._operators, self._vector = operators, vector
         self._vocabulary = Vocabulary(operators, extra, read=self._meaning, **options)
 
-    def read(self, text: str) -> Statement:
-        """The statement, by the one reading whose names and spaces fit, with the definitions before and behind it.
+    def read(self, text: str, before: Sequence[Definition] = ()) -> Statement:
+        """The statement, by the one reading whose names and spaces fit, with the definitions around it and those before.
 
         Raises
         ------
         ParseError
             Nothing fits (the reasons of both readings are shown), or both do. SpacesError where only the spaces do not fit.
         """
-        definitions, claim = parted(text, self._is_by_block)
+        definitions, claim = divided(text, self._is_by_block)
+        definitions = [*before, *definitions]
         refuse_by_block(claim, self._vocabulary.own | {d.name for d in definitions})
         source = spelled(claim)
         vocabulary = self._with(definitions)
@@ -94,7 +95,7 @@ class Statements:
         return is_by_block(claim, own=self._vocabulary.own | {*own})
 
     def _with(self, definitions: Sequence[Definition], choice: Mapping[str, int] | None = None) -> Vocabulary:
-        return self._vocabulary.with_letters(definitions, {}, choice or {})
+        return self._vocabulary.with_letters(definitions, choice or {})
 
     def _meaning(self, what: str, vocabulary: Vocabulary, name: str) -> Any:
         """What a definition says, in the words that it sees."""
@@ -105,7 +106,7 @@ class Statements:
                 raise ParseError(f"{name} := {text} is a statement: a letter stands for one expression")
             return found.lhs
 
-        return meant(Definition(name, what, f"{name} := {what}"), self._operators, expression, self._vector)[0]
+        return meant(Definition(name, what, f"{name} := {what}"), self._operators, expression, self._vector)
 
     def _fitting(self, source: Spelled, text: str, claim: str, vocabulary: Vocabulary) -> Statement:
         """The one of both readings that fits."""
@@ -132,7 +133,7 @@ class Statements:
             raise ParseError(f"{claim!r} reads in two ways and both fit:\n{shown}\nwrite .T for a transpose, or juxtapose to multiply")
         if vocabulary.used:
             used = reversed(vocabulary.used.items())
-            first.letters = {STANDARD[n].text if n in STANDARD else n: _shown_text(spelled(what).text) for n, (what, _) in used}
+            first.letters = {shown_text(n): shown_text(what) for n, (what, _) in used if shown_text(what) != shown_text(n)}
             reading, themselves = first.reading, vocabulary.standing_for_themselves()
             first._shown = lambda: self._read(source, text, reading, themselves)
         return first
@@ -185,14 +186,6 @@ class Statements:
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in WITH_ARGUMENTS:
                 return vocabulary.indexed(name, [ast.unparse(a) for a in arguments])
         raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
-
-
-def _shown_text(what: str) -> str:
-    """The text of a definition as it is shown: the table's letters for the grammar's names."""
-    return re.sub(r"[A-Za-z_]+", lambda m: _SHOWN.get(m[0], m[0]), re.sub(r"\s+", " ", what).strip()).replace(" ^*", "*").replace("^*", "*")
-
-
-_SHOWN = {s.name: s.text for s in _core.symbols} | {n: known.text for n, known in STANDARD.items()} | {"MM": "ℳ", "vdot": "θ̈"}
 
 
 def _comparison(source: str) -> str:

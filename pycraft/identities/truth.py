@@ -14,6 +14,7 @@ from .. import _core
 from ..file_targets import writable_target
 from ..progress_bar import StepProgress
 from .budget import Budget
+from .dialects import in_dialect
 from .family import CELLS, CONSTANT, EVERY, HYPOTHESES, ONE, VARIANTS, WITH_J, Cell, Spec, family, nilpotency, read_on, specs
 from .judge import FAILS, HOLDS, UNDECIDED
 from .parse import Statements, as_text
@@ -175,6 +176,7 @@ def truth(
     precision: str | int = "extended",
     budget: float = 5.0,
     vectors: Mapping[str, str] | None = None,
+    dialect: str | None = None,
     progress: bool = True,
 ) -> TruthMap:
     """The truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
@@ -186,6 +188,7 @@ def truth(
     precision : the first scalar beside double
     budget : CPU seconds for the smallest cases, of all cells together
     vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
+    dialect : the school in whose letters it is written, see `check`
     progress : whether a bar is shown in a terminal or notebook if it takes more than a second
 
     Returns
@@ -206,7 +209,8 @@ def truth(
     'TRUE where J = 0'
     """
     begin = time.perf_counter()
-    made = truth_within(as_text(statement), Budget(math.inf), precision, vectors, progress)
+    statement = in_dialect(as_text(statement), dialect)
+    made = truth_within(statement, Budget(math.inf), precision, vectors, progress)
     assert made is not None
     false = [c for c in made.cells if c.example is not None]
     whole = Budget(budget)

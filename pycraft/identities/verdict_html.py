@@ -11,6 +11,7 @@ MARKS = {
     "true": ("✓", GREEN),
     "proved": ("✓", GREEN),
     "holds anyway": ("✓", SKY),
+    "true where": ("◐", BLUE),
     "fails": ("✗", RED),
     "FALSE": ("✗", RED),
     "no proof found": ("?", ORANGE),

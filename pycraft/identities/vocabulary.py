@@ -1,7 +1,7 @@
 """The words of statements: operators by their typed names, functions, powers; and the errors of text that cannot be read.
 
-A name is looked for among what the caller adds, the definitions of the statement, the dialect, the letters of the operator table, and those
-of the equations of motion (`standard_letters`), in this order; X_dot is the rate ∂_tX where no letter is called so.
+A name is looked for among the definitions of the statement, what the caller adds, the letters of the operator table, and those of the
+equations of motion (`standard_letters`), in this order; X_dot is the rate ∂_tX where no letter is called so.
 """
 
 from __future__ import annotations
@@ -109,10 +109,10 @@ class Vocabulary:
         self._derive, self._read = derive, read
         H, phi, M = operators("H phi M")
         self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension}
+        self._base = dict(self._own)
         self._own |= {"vdot": _core.vector("vdot", operators.Theta), **(extra or {})}
         self._operators = operators
         self._definitions: tuple[Any, ...] = ()
-        self._dialect: Mapping[str, str] = {}
         self._choice: Mapping[str, int] = {}
         self._seen = math.inf
         self._open: tuple[tuple[str, str], ...] = ()
@@ -125,42 +125,44 @@ class Vocabulary:
             setattr(other, f"_{name}", value)
         return other
 
-    def with_letters(self, definitions: Sequence[Any], dialect: Mapping[str, str], choice: Mapping[str, int]) -> Vocabulary:
-        """The same words and those of definitions and a dialect; of letters with several meanings those that are chosen."""
-        other = self._as(definitions=tuple(definitions), dialect=dialect, choice=choice, made={})
+    def with_letters(self, definitions: Sequence[Any], choice: Mapping[str, int]) -> Vocabulary:
+        """The same words and those of definitions; of letters with several meanings those that are chosen."""
+        other = self._as(definitions=tuple(definitions), choice=choice, made={})
         other.used = {}
         return other
 
     def choices(self, text: str) -> Iterator[dict[str, int]]:
         """The meanings that letters of a text may have."""
-        several = [
-            name
-            for name, known in STANDARD.items()
-            if len(known.meanings) > 1 and name in text and name not in self._own and name not in {d.name for d in self._definitions}
-        ]
-        for chosen in itertools.product(*(range(len(STANDARD[name].meanings)) for name in several)):
+        meanings = {name: len(known.meanings) for name, known in STANDARD.items() if name not in self._own}
+        meanings |= {d.name: 1 + len(d.others) for d in self._definitions}
+        several = {name: count for name, count in meanings.items() if count > 1 and name in text}
+        for chosen in itertools.product(*map(range, several.values())):
             yield dict(zip(several, chosen, strict=True))
 
     @property
     def own(self) -> set[str]:
         """Names that are not the table's."""
-        return {*self._own, *(d.name for d in self._definitions), *self._dialect}
+        return {*self._own, *(d.name for d in self._definitions)}
 
     @property
     def names(self) -> set[str]:
         """Names that stand alone, without arguments."""
         letters = {*_NAMES, *_ALIASES, *STANDARD, *self.own}
-        return letters | {f"{name}_dot" for name in letters - {"I", "N"} if not name.endswith("dot")}
+        numbers = {"I", "N"} - {d.name for d in self._definitions}
+        return letters | {f"{name}_dot" for name in letters - numbers if not name.endswith("dot")}
 
     def operator(self, name: str) -> Any:
+        named = [i for i, d in enumerate(self._definitions) if d.name == name]
+        if named and (named[0] < self._seen or not (is_known(name) or name in self._own)):
+            index = max((i for i in named if i < self._seen), default=named[0])
+            made = self._definitions[index]
+            scope = dict(definitions=(), own=self._of_the_book()) if made.of_the_book else dict(seen=index)
+            return self._defined(name, (made.what, *made.others)[self._choice.get(name, 0)], scope)
+        base = name.removesuffix("_dot")
+        if base != name and any(d.name == base for d in self._definitions):  # the rate of what is called so here: Ḣ where H is ℳ
+            return self.derivative(self.operator(base), "t")
         if name in self._own:
             return self._own[name]
-        named = [i for i, d in enumerate(self._definitions) if d.name == name]
-        if named and (named[0] < self._seen or not self._is_known(name)):
-            index = max((i for i in named if i < self._seen), default=named[0])
-            return self._defined(name, self._definitions[index].what, dict(seen=index))
-        if name in self._dialect:
-            return self._defined(name, self._dialect[name], dict(definitions=(), dialect={}, own=self._of_the_book()))
         if name in WITH_ARGUMENTS:
             return self._of_any(name)
         if name in _NAMES or _ALIASES.get(name, "vdot") != "vdot":
@@ -169,20 +171,17 @@ class Vocabulary:
             return self.operator(_ALIASES[name])
         if name in STANDARD:
             # Of the definitions in force those of the equations of motion reach others of them: z is made with the T that is given.
-            among = tuple(d for d in self._definitions if d.name in STANDARD)
-            return self._defined(
-                name, STANDARD[name].meanings[self._choice.get(name, 0)], dict(definitions=among, dialect={}, own=self._of_the_book())
-            )
+            among = tuple(d for d in self._definitions if d.name in STANDARD and not d.of_the_book)
+            scope = dict(definitions=among, own=self._of_the_book())
+            return self._defined(name, STANDARD[name].meanings[self._choice.get(name, 0)], scope)
         if name.endswith("_dot") and name.removesuffix("_dot") in self.names:
             return self.derivative(self.operator(name.removesuffix("_dot")), "t")
         raise ParseError(self.unknown(name))
 
     def _of_the_book(self) -> dict[str, Any]:
         """What the caller adds, but for letters of the table with another meaning: of these no letter of the book is made."""
-        return {name: value for name, value in self._own.items() if name in STANDARD or name not in _NAMES}
-
-    def _is_known(self, name: str) -> bool:
-        return name in self._dialect or is_known(name)
+        own = {name: value for name, value in self._own.items() if name in STANDARD or name not in _NAMES}
+        return own | {"MM": self._base["MM"], "I": self._base["I"], "N": self._base["N"]}
 
     def _of_any(self, name: str) -> Any:
         """A letter without its arguments: of any nodes, Δ of the coordinate i."""
@@ -206,14 +205,21 @@ class Vocabulary:
     def standing_for_themselves(self) -> Vocabulary:
         """The same words, letters that were used and defined by letters of their own, with no more than a name and spaces."""
         extra = {}
+        translated = {d.name for d in self._definitions if d.of_the_book}
         for name, (_, value) in self.used.items():
-            if isinstance(value, _core.Operator) and value.domain is not None and value.kind not in ("vector", "symbol"):
+            if (
+                name not in translated
+                and isinstance(value, _core.Operator)
+                and value.domain is not None
+                and value.kind not in ("vector", "symbol")
+            ):
                 shown = STANDARD[name].text if name in STANDARD else name
                 if value.domain.name == "R^1":
                     extra[name] = _core.vector(shown, value.codomain)
                 elif max(value.shape) <= LARGEST_SHOWN:
                     extra[name] = _core.constant(np.zeros(value.shape), value.domain, value.codomain, shown)
-        return self._as(own={**self._own, **extra})
+        kept = tuple(d for d in self._definitions if d.name not in extra)
+        return self._as(own={**self._own, **extra}, definitions=kept)
 
     def indexed(self, name: str, arguments: list[str]) -> Any:
         arguments = [a.strip().strip("'\"") for a in arguments]

@@ -65,6 +65,8 @@ class PinocchioModel:
 def to_pinocchio(model: Described) -> PinocchioModel:
     """The model as a `pinocchio.Model` made joint by joint, with rotor inertias as armature and the same gravity.
 
+    Of rotors that differ on a ball, or stand on a free hinge's travels, Pinocchio leaves v ×* (J v) out (docs/conventions.md).
+
     Raises PeerRefusal for what Pinocchio refuses. All hinge kinds go over.
     """
     pin, _ = required("pinocchio", "peers", "a hand-over to Pinocchio needs"), described(model, "to_pinocchio")

@@ -80,8 +80,9 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
     """Compare a model with another package's model of the same robot.
 
     Hinges and joints are matched by name. Order of joints, quaternions, axes of velocities and cosine-sine pairs are conventions: they are
-    said, and converted. Gravity and rotor inertia (armature) are said, and taken from the other model in what is compared. Masses,
-    centres of mass, inertias and placements that differ are said with the body; then the numbers differ, too.
+    said, and converted. Gravity and rotor inertia (armature) are said, and taken from the other model in what is compared; v ×* (J v) of
+    rotors that the other package has not (docs/conventions.md) is said, and left out. Masses, centres of mass, inertias and placements that
+    differ are said with the body; then the numbers differ, too.
 
     Parameters
     ----------
@@ -159,7 +160,16 @@ def _in_common(model: Any, twin: Twin, result: ModelComparison) -> Any:
         if not np.allclose(own, theirs, rtol=1e-14, atol=0):
             result.differences.append(Difference("rotor inertia", f"{name}: {_vector(own)} here, {_vector(theirs)} there", True))
             common.hinges[name].rotor_inertia = theirs
+        turning = _rotor_forces(common, twin, np.linspace(1.0, 2.0, model.nv))[hinge.v_slice]
+        if turning.any():
+            text = f"{name}: v ×* (J v) of its rotors is in the equations of motion here, not there, and left out of what is compared"
+            result.differences.append(Difference("rotor inertia", text, True))
     return common
+
+
+def _rotor_forces(common: Any, twin: Twin, v: np.ndarray) -> np.ndarray:
+    """v ×* (J v) (nv,) where the other package leaves it out."""
+    return np.where(twin.lacks_rotor_forces(), common.rotor_forces(v), 0.0)
 
 
 def _bodies_apart(model: Any, twin: Twin, drawn: list[Any]) -> list[tuple[str, str]]:
@@ -199,10 +209,11 @@ def _compare_at(result: ModelComparison, model: Any, common: Any, twin: Twin, st
     eps = float(np.finfo(float).eps)
     M = common.mass_matrix(q)
     condition = float(np.linalg.cond(M)) if n else 1.0
+    left_out = _rotor_forces(common, twin, v)
     raw: dict[str, tuple[Callable[[], np.ndarray], np.ndarray]] = {
         "mass matrix": (lambda: common.mass_matrix(q), twin.mass_matrix(q)),
-        "inverse dynamics": (lambda: common.inverse_dynamics(q, v, u), twin.inverse_dynamics(q, v, u)),
-        "forward dynamics": (lambda: common.forward_dynamics(q, v, u), twin.forward_dynamics(q, v, u)),
+        "inverse dynamics": (lambda: common.inverse_dynamics(q, v, u) - left_out, twin.inverse_dynamics(q, v, u)),
+        "forward dynamics": (lambda: common.forward_dynamics(q, v, u + left_out), twin.forward_dynamics(q, v, u)),
     }
     as_is = {
         "mass matrix": (model.mass_matrix(q), T @ raw["mass matrix"][1] @ T.T),

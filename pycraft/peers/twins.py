@@ -60,6 +60,10 @@ class Twin(ABC):
     def conventions(self) -> list[tuple[str, str]]:
         """In what the two packages write the same thing otherwise."""
 
+    def lacks_rotor_forces(self) -> np.ndarray:
+        """Where (nv,) the other package leaves v ×* (J v) of rotors out of the equations of motion (docs/conventions.md)."""
+        return np.zeros(len(self.armature), bool)
+
     def effects_apart(self, states: Sequence[Any]) -> list[Apart]:  # noqa: ARG002 - subclasses need it
         """In what the effects of the two models' files differ; `states` are those that are looked at."""
         return []
@@ -148,6 +152,9 @@ class PinocchioTwin(Twin):
         self.gravity = np.array(other.gravity.linear)
         self.armature = np.abs(self._map.velocities(np.zeros(model.nq)).T) @ np.asarray(other.armature)
 
+    def lacks_rotor_forces(self):
+        return np.ones(self.model.nv, bool)
+
     def velocities(self, q):
         return self._map.velocities(q)
 
@@ -216,6 +223,10 @@ class MuJoCoTwin(Twin):
         self._q, self._v, self._joints = mujoco_convention.order(model, other)
         self.armature = np.empty(model.nv)
         self.armature[mujoco_convention.permutation(model)[1]] = mjcf_effects.armature(other)[self._v]
+
+    def lacks_rotor_forces(self):
+        balls = [hinge.v_slice for hinge in self.model.hinges.values() if any(s["kind"] == "ball" for s in hinge.subhinges)]
+        return np.isin(np.arange(self.model.nv), [j for of in balls for j in range(of.start, of.stop)])
 
     def _move(self, q, v):
         import mujoco

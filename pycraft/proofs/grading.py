@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .. import _core
+from ..identities.budget import Budget
 from ..identities.checker import check
+from ..identities.formula_reading import read_formula
 from ..identities.parse import Statement
-from ..identities.vocabulary import is_number
+from ..identities.vocabulary import ParseError, SpacesError, is_number
 from .attempt import Attempt
 from .derivation import DerivativeProblem
 from .equations import Step
@@ -18,10 +20,15 @@ from .gaps import WithGaps
 from .models_tried import examples
 from .proof import Proof
 from .prove import _settings, prove
+from .repair import nearest, small_models
 from .values import LARGEST, NoValue, transferred
 from .walk import GaveUp
 from .words import ONE, Alphabet, Polynomial, Word, combine, number, ratio, split
 
+LIKELY = 1.5
+"""Slips up to this cost are told of a line that does not fit: a star, a tilde, a sign, the order, a letter written for one near it."""
+SLIPS = 2.0
+"""CPU seconds for the slip of a line that does not fit."""
 ACCEPTED = ("right", "another road")
 _SAYS = {
     "J = 0": "a hinge-diagonal term J is lost",
@@ -85,7 +92,8 @@ class Exercise(WithGaps):
         try:
             expression = self._expression(line)
         except (_core.Error, NoValue) as error:
-            return Judgement("unreadable", str(error))
+            slip = self._written_wrong(line) if isinstance(error, SpacesError) else ""
+            return Judgement("wrong", f"spaces do not fit: {slip}") if slip else Judgement("unreadable", str(error))
         if (misfit := self._misfit(expression)) is not None:
             return Judgement("wrong", misfit)
         problem = self._problem()
@@ -126,6 +134,15 @@ class Exercise(WithGaps):
         if not {id(s) for s in line.sources} <= {id(s) for s in lhs.sources}:
             line = transferred(line, self._operators())
         return line @ _core.identity(lhs.domain) if line.domain is None and lhs.domain == lhs.codomain else line
+
+    def _written_wrong(self, line: str) -> str:
+        """What one slip of the pen would make of a line that fits nowhere the theorem's left side, in words; empty where none would."""
+        try:
+            formula = read_formula(f"{line.strip().removeprefix('=')} = {self.lines[0]}")
+        except ParseError:
+            return ""
+        near, *_ = nearest(formula, small_models(), Budget(SLIPS))
+        return next((slip.words for new, slip in near if new[1] == formula[1] and slip.cost <= LIKELY), "")
 
     def _misfit(self, line: Any) -> str | None:
         """What is said of a line between other spaces than the theorem's."""

@@ -14,6 +14,7 @@ from typing import Any
 
 from .. import _core
 from ..identities.checker import with_spaces
+from ..identities.dialects import in_dialect
 from ..identities.parse import Statement
 from ..identities.vocabulary import is_number, is_operator
 from . import mechanics, scalar_spelling
@@ -36,7 +37,15 @@ from .words import ONE, Alphabet, Polynomial, Word, combine, inverted, plain, sp
 
 
 @within_reach("prove")
-def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str] = (), define: Mapping[str, Any] | None = None) -> Proof:
+def prove(
+    lhs: Any,
+    rhs: Any = None,
+    model: Any = None,
+    *,
+    assume: Iterable[str] = (),
+    define: Mapping[str, Any] | None = None,
+    dialect: str | None = None,
+) -> Proof:
     """Derive one side of a statement from the other, from the definitions of the operators.
 
     Parameters
@@ -49,6 +58,7 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str]
     define : letters of one's own for the text, by name: expressions, text that reads as one, "Θ", "V" or "F" for a vector there, "Θ → V"
         for an operator of which nothing is known. In the text itself they stand before the statement:
         `x ∈ Θ; C : Θ → Θ; A := I + HφK; statement`.
+    dialect : the school in whose letters the text is written, see `pycraft.check`
 
     Returns
     -------
@@ -85,6 +95,7 @@ def prove(lhs: Any, rhs: Any = None, model: Any = None, *, assume: Iterable[str]
         raise _core.EvaluationError("a statement has two sides: prove(lhs, rhs), or prove(text, model)")
     if texts and rhs is not None and model is None:
         model = rhs
+    lhs = in_dialect(lhs, dialect) if texts else lhs
     if texts:
         read_on = reading(operators_of(model if model is not None else example()), define)
         read = read_on.statement(lhs)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from .. import _core
-from ..identities.block_reading import is_by_block
-from ..identities.definitions import Definition, letter_name, meant, parted
+from ..identities.block_reading import is_by_block, read_by_block
+from ..identities.definitions import Definition, is_map, letter_name
+from ..identities.dialects import divided
 from ..identities.directions import COORDINATES, along, coordinates_meant
 from ..identities.parse import ParseError, Statement, Statements
 from .derivative import TIME, derivative
+from .lifting import lifted
 from .proof import HYPOTHESES
 
 
@@ -32,7 +34,8 @@ class Reading:
 
     Attributes
     ----------
-    extra : one's own letters by their names
+    extra : one's own letters that are expressions, by their names
+    definitions : those that are text
     unknown : names of operators of which nothing is known but their spaces
     written_out : whether derivatives are worked out as they are read, and are no letters of their own
     """
@@ -40,6 +43,7 @@ class Reading:
     operators: Any
     extra: dict[str, Any] = field(default_factory=dict)
     unknown: set[str] = field(default_factory=set)
+    definitions: list[Definition] = field(default_factory=list)
     written_out: bool = False
 
     def define(self, name: str, what: Any) -> None:
@@ -51,37 +55,54 @@ class Reading:
             Text that is none of these; a name that is none.
         """
         if isinstance(what, str):
-            self._add(Definition(letter_name(name), what.strip(), f"{name} := {what}"))
+            self._add([Definition(letter_name(name), what.strip(), f"{name} := {what}")])
         else:
             self.extra[letter_name(name)] = what
 
-    def _add(self, made: Definition) -> None:
-        def expression(text: str) -> Any:
-            read = self._statements().read(text)
-            if read.rhs is not None:
-                raise ParseError(f"{made.typed} is a statement: a letter stands for one expression")
-            return read.lhs
-
-        self.extra[made.name], nothing_known = meant(made, self.operators, expression)
-        if nothing_known:
-            self.unknown.add(made.name)
+    def _add(self, made: Sequence[Definition]) -> None:
+        for d in made:
+            self.definitions.append(d)
+            value = None if d.of_the_book else self._statements().letter(d.name, self.definitions)  # what does not read is said at once
+            if is_map(d):  # one operator, in the statement and in what is assumed
+                self.extra[d.name] = value
+                self.definitions.pop()
+                self.unknown.add(d.name)
 
     def _statements(self, more: Mapping[str, Any] | None = None) -> Statements:
         return Statements(self.operators, {**(more or {}), **self.extra}, derive=along if self.written_out else _formula)
 
     def statement(self, text: str) -> Statement:
         """The statement, with the definitions before and behind it. Raises ParseError."""
-        definitions, claim = parted(text, lambda said, own: is_by_block(said, own=[*self.extra, *own]))
-        for made in definitions:
-            self._add(made)
+        own = [*self.extra, *(d.name for d in self.definitions)]
+        definitions, claim = divided(text, lambda said, more: is_by_block(said, own=[*own, *more]))
+        self._add(definitions)
+        if is_by_block(claim, own=[*own, *(d.name for d in definitions)]):
+            claim = self._of_operators(claim)
         return self.read(claim)
+
+    def _of_operators(self, claim: str) -> str:
+        """A statement by block as the statement of operators that it is. Raises ParseError where it is none."""
+
+        def kind(name: str) -> str:
+            made = self._statements().letter(name, self.definitions)
+            if made.domain is None or made.domain.name == "R^1":
+                return "vector"
+            return "blocks" if made.is_block_diagonal else "rows" if made.domain == self.operators.Theta else ""
+
+        lift = lifted(read_by_block(claim, before=self.definitions), kind)
+        if lift is None:
+            raise ParseError(
+                f"{claim!r} is a statement by block that is none of operators: proved are those of every body k, its parent and children, "
+                "such as V(k) = φ*(℘(k),k)V(℘(k)) + H*(k)θ̇(k); pycraft.check evaluates it for every choice of bodies"
+            )
+        return lift
 
     def read(self, text: str) -> Statement:
         """Both sides. N stays the trace of I: what is proved is said of every model, so no model's number of coordinates may enter."""
         try:
-            return self._statements({"N": _core.identity(self.operators.Theta).trace()}).read(text)
+            return self._statements({"N": _core.identity(self.operators.Theta).trace()}).read(text, self.definitions)
         except ParseError as error:
-            if re.search(r"\bN\b", text) and "N" not in self.extra:
+            if re.search(r"\bN\b", text) and "N" not in {*self.extra, *(d.name for d in self.definitions)}:
                 raise ParseError(
                     f"{error}\nN, the number of coordinates, differs from model to model: in a proof it stands beside scalars"
                 ) from None

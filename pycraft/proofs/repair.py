@@ -16,7 +16,8 @@ from typing import Any
 from .. import _core
 from ..identities.block_reading import refuse_by_block
 from ..identities.budget import Budget
-from ..identities.definitions import Definition, parted
+from ..identities.definitions import Definition
+from ..identities.dialects import divided, in_dialect
 from ..identities.edits import Slip, changed
 from ..identities.family import HYPOTHESES, Spec
 from ..identities.formula import Formula, written_statement
@@ -104,13 +105,14 @@ class Repairs:
         return f"<p>{escape(self.statement)}{escape(': ' + self.was_true if self.was_true else '')}</p><ol>{items}</ol>{ended}"
 
 
-def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
+def repair(statement: str, *, most: int = 3, budget: float = 5.0, dialect: str | None = None) -> Repairs:
     """The true formulas nearest to a wrong one: one star, sign, tilde, letter, order, inverse, factor, number or term away.
 
     Parameters
     ----------
     statement : as text; its spaces need not fit. Names are those of random trees: "body0", "hinge0", "node0", ...
     most : formulas at most
+    dialect : the school in whose letters the statement is written, see `check`
     budget : CPU seconds. Where they end the search, `.ended` and the printed result say what was left out.
 
     Returns
@@ -134,11 +136,13 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0) -> Repairs:
           true where J = 0; proved
     """
     begin, spending = time.perf_counter(), Budget(budget)
-    definitions, claim = parted(as_text(statement))
+    statement = in_dialect(as_text(statement), dialect)
+    definitions, claim = divided(statement)
     refuse_by_block(claim)
     formula = read_formula(claim, [d.name for d in definitions])
     models = small_models(definitions)
-    before = "".join(f"{d.typed}; " for d in definitions)
+    before = "".join(f"{d.typed}; " for d in definitions if not d.of_the_book)
+    before = statement[: statement.index(";") + 1] + before if any(d.of_the_book for d in definitions) else before
     result = Repairs(statement)
     if _is_close(formula, models) and (own := _found(formula, None, spending, before)) is not None:
         needs = own.where[0]

@@ -154,6 +154,22 @@ class RigidOperators(Operators):
     )
     b = symbol(lambda o: o.V_bar @ o.M @ o.V, "b: gyroscopic forces, (6n,): V̄MV.")
 
+    @cached_property
+    def hinge_cross(self):
+        """θ̇ ×*, Θ → Θ, (nv, nv), block diagonal: ω̃ of a ball, crf(V) of a free subhinge, zero of one coordinate."""
+        blocks, at = [], 0
+        for body in self.description["bodies"]:
+            for subhinge in body["hinge"]["subhinges"]:
+                size = V_SIZE[subhinge["kind"]]
+                v = self.v[at : at + size]
+                blocks.append({1: lambda _: np.zeros((1, 1)), 3: skew, 6: crf}[size](v))
+                at += size
+        return block_diagonal(blocks)
+
+    b_J = symbol(
+        lambda o: o.hinge_cross @ o.J @ o.v, "b_J: gyroscopic forces of rotors, (nv,): θ̇ ×* (Jθ̇), of energy ½θ̇*Jθ̇ [Euler–Poincaré]."
+    )
+
 
 def operators(description, q, v=None, form="fast"):
     """Every operator of a rigid multibody model at one state.
@@ -167,7 +183,8 @@ def operators(description, q, v=None, form="fast"):
     Returns
     -------
     RigidOperators : what `sko_operators` returns and, all in body-frame components, the attributes Delta_theta_dot V_tilde
-        V_bar momentum_cross H_dot V a b a_gravity, and the methods B(names) Jacobian(names) Lambda(names) Delta(i) world_pose(k).
+        V_bar momentum_cross H_dot V a b b_J hinge_cross a_gravity, and the methods B(names) Jacobian(names) Lambda(names) Delta(i)
+        world_pose(k).
         Raises ValueError for arrays of wrong length and, naming body and hinge, for a quaternion without direction.
 
     Examples
@@ -187,24 +204,25 @@ def operators(description, q, v=None, form="fast"):
 
 
 def inverse_dynamics_vectors(description, q, v, vdot):
-    """alpha = φ*(H*θ̈ + a), f = φ(Mα + b), both (6n,), and T = Hf + Jθ̈, (nv,), as a namespace.
+    """alpha = φ*(H*θ̈ + a), f = φ(Mα + b), both (6n,), and T = Hf + Jθ̈ + b_J, (nv,), as a namespace.
 
     With gravity α is the body-frame derivative of V less the field of gravity, and f the true interbody forces.
     """
     o = operators(description, q, v)
     alpha = o.phi.T @ (o.H.T @ vdot + o.a)
     f = o.phi @ (o.M @ alpha + o.b)
-    return SimpleNamespace(alpha=alpha, f=f, T=o.H @ f + o.J @ vdot)
+    return SimpleNamespace(alpha=alpha, f=f, T=o.H @ f + o.J @ vdot + o.b_J)
 
 
 def forward_dynamics_vectors(description, q, v, tau, form="fast"):
     """z, epsilon, nu, alpha, f and vdot of the articulated-body recursion at generalized forces T = tau, as a namespace.
 
-    z = ψ(KT + Pa + b), ε = T − Hz, ν = D⁻¹ε, α = ψ*(H*ν + a), f = P(α − a) + z, θ̈ = [I − HψK]*ν − K*ψ*a.
+    z = ψ(KT + Pa + b), ε = T − Hz with T = tau − b_J, ν = D⁻¹ε, α = ψ*(H*ν + a), f = P(α − a) + z, θ̈ = [I − HψK]*ν − K*ψ*a.
     """
     o = operators(description, q, v, form)
-    z = o.psi @ (o.K @ tau + o.P @ o.a + o.b)
-    epsilon = tau - o.H @ z
+    T = tau - o.b_J
+    z = o.psi @ (o.K @ T + o.P @ o.a + o.b)
+    epsilon = T - o.H @ z
     nu = o.D_inverse @ epsilon
     alpha = o.psi.T @ (o.H.T @ nu + o.a)
     f = o.P @ (alpha - o.a) + z
@@ -223,9 +241,9 @@ def forward_dynamics(description, q, v, tau, form="fast"):
 
 
 def bias_forces(description, q, v):
-    """𝒞, (nv,): Hφ(Mφ*a + b), Coriolis, gyroscopic and gravity forces."""
+    """𝒞, (nv,): Hφ(Mφ*a + b) + b_J, Coriolis, gyroscopic and gravity forces."""
     o = operators(description, q, v)
-    return o.H @ o.phi @ (o.M @ o.phi.T @ o.a + o.b)
+    return o.H @ o.phi @ (o.M @ o.phi.T @ o.a + o.b) + o.b_J
 
 
 def mass_matrix(description, q):

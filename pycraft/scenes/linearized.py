@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number
+from ..arguments import of_state, one_number
 from ..dynamics.linear_on_loops import chosen_numbers, independent_numbers, linear_model_on_loops
 from ..dynamics.linearization import linear_model, listed
 from ..dynamics.loop_tangents import TreeDerivatives, kept_rows
@@ -57,7 +57,8 @@ def _along(
         return stacked([one], 0)
     each: list[LinearModel] = []
     for b in range(count):
-        each.append(_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs, independent))
+        with of_state(b, count):
+            each.append(_at(scene, calls, q[b], v[b], float(times[b]), own[b], chosen, names, outputs, independent))
         independent = independent or (chosen_numbers(each[0]) if each[0].tangent is not None else None)
     return stacked(each)
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import of_state
 from ..dynamics.displacements import turning
 from ..dynamics.quadratic import QuadraticModel
 from ..dynamics.second_order import Nominal, StateEquation, curved
@@ -52,7 +53,10 @@ class SceneRates:
         self._scene, self._t, calls = scene, t, scene._calls()
         self._nv = nv = scene.model.nv
         states = zip(q, rest[:, :nv], t.tolist(), rest[:, nv:].tolist(), strict=True)
-        self._found = [_core.scene_linearized(calls, *state, between) for state in states]
+        self._found = []
+        for b, state in enumerate(states):
+            with of_state(b, len(q)):
+                self._found.append(_core.scene_linearized(calls, *state, between))
         own = len(self._found[0]["own"]) if self._found else rest.shape[-1] - nv
         stacked = lambda name, *shape: np.array([one[name] for one in self._found]).reshape(len(q), *shape)
         self.q, self.value = stacked("q", q.shape[-1]), stacked("rates", nv + own)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import moment
+from ..arguments import moment, of_state
 from ..dynamics.equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from ..dynamics.equilibrium_on_loops import solved_on_loops
 from ..dynamics.interbody import forces_of_scene, refuse_state
@@ -117,4 +117,10 @@ class Statics:
             raise _core.ModelError(
                 f"q of {self.model.name!r} takes {self.model.nq} numbers, or (B, {self.model.nq}), not an array {starts.shape}"
             )
-        return [one(q) for q in starts] if starts.ndim == 2 else one(starts)
+        if starts.ndim != 2:
+            return one(starts)
+        found = []
+        for b, q in enumerate(starts):
+            with of_state(b, len(starts)):
+                found.append(one(q))
+        return found

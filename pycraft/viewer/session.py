@@ -28,6 +28,8 @@ LATE = 0.1
 UNSEEN = 10.0
 """s without a page that asks after which it stops playing."""
 SCALES = (1e-3, 1e3)
+DIRECTIONS = ("from above", "side", "front", "back", "top")
+"""Where pages look from: VIEWS of `web/figure.js`."""
 SEEN_STATES = 8
 """Random ones that the first look has in view, beside the present and the neutral one."""
 
@@ -51,6 +53,7 @@ class Session:
         self.playing, self.scale, self.rate, self.message = False, 1.0, 0.0, ""
         self._edits, self._asked, self._seeds = 0, time.monotonic(), 0
         self.extras = Extras()
+        self.camera: dict[str, Any] | None = None
         self._push: Push | None = None
         self._ended = threading.Event()
         self._wake = threading.Event()
@@ -73,7 +76,7 @@ class Session:
                 "effects": [{"name": name, "kind": type(live.scene.effects[name]).__name__, "on": live.scene.is_on(name),
                              "fields": shown_fields(live.scene.effects[name], live.model)} for name in names],
                 "ghosts": [*(["beside"] if self._beside is not None else []), *(f"without {name}" for name in names)],
-                "ghost_name": self.ghost_name, "extras": self.extras.shown(live.skeleton),
+                "ghost_name": self.ghost_name, "extras": self.extras.shown(live.skeleton), "camera": self.camera,
                 "letters": list(LETTERS), "loops": list(model.loops),
             }  # fmt: skip
 
@@ -206,6 +209,22 @@ class Session:
         self.message = lead(self.live, *given_place(self.live, body, place, to))
         self._ghost_follows()
 
+    def look(self, direction: Any, follow: Any, zoom: Any) -> None:
+        """Where pages look from, what their cameras follow, and how near they are, until someone moves them."""
+        with self.lock:
+            bodies = self.live.skeleton.bodies
+            if direction not in DIRECTIONS:
+                raise _core.EvaluationError(f"direction={direction!r:.60}: there are {', '.join(map(repr, DIRECTIONS))}")
+            called = getattr(follow, "name", follow)
+            if called not in (None, "robot", *bodies):
+                raise _core.ModelError(f"follow: 'robot', a body of {self.live.model.name!r} or None, not {called!r:.60}")
+            near = one_number(zoom, "zoom")
+            if not 0 < near < np.inf:
+                raise _core.EvaluationError(f"zoom={near:g}: a number above zero, 1 at first")
+            followed = "" if called is None else "robot" if called == "robot" else str(bodies.index(called))
+            self.camera = {"direction": direction, "follow": followed, "zoom": near, "count": self._edits}
+            self._edits += 1
+
     def draw(self, extra: dict[str, Any] | None, name: str = "") -> None:
         """Something of a user's code in the picture; None takes it out, by its name, or everything."""
         with self.lock:
@@ -316,7 +335,7 @@ def _shade(live: LiveScene, name: str) -> tuple[dict[str, Any] | None, list[str]
     except _core.Error as error:
         return None, [f"no shares: {error}"]
     high = float(values.max(initial=0.0)) or 1.0
-    label = f"tr Υ(k)M(k): {values.sum():.4g} of N = {live.model.nv}"
+    label = f"degrees of freedom by body, tr Υ(k)M(k): {values.sum():.4g} of N = {live.model.nv}"
     return {"values": values.tolist(), "low": 0.0, "high": high, "label": label}, []
 
 

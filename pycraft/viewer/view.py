@@ -91,6 +91,20 @@ class View:
         """
         return self._shows(name, {"kind": "shape", "shape": kind, "size": size, "pose": pose, "file": file}, on, colour)
 
+    def look(self, direction: str = "from above", follow: Any = None, *, zoom: float = 1.0) -> View:
+        """Turn the cameras of all pages; returns the view.
+
+        Parameters
+        ----------
+        direction : {"from above", "side", "front", "back", "top"}
+        follow : "robot", a body or its name, which stays in the middle; None: nothing
+        zoom : 1 at first, 2 twice as near
+
+        EvaluationError and ModelError for others.
+        """
+        self.session.look(direction, follow, zoom)
+        return self
+
     def remove(self, name: str) -> View:
         """Take out what code has shown under a name. ModelError where there is none."""
         self.session.draw(None, text(name, "name"))

@@ -211,7 +211,11 @@ def test_motion_is_the_robots(case):
     for s in (soa, own):
         acceleration = s.phi.T @ (s.H.T @ vdot + s.a.value() + s.gravity_base.value())
         both.append(acceleration)
-        near(s.H @ (s.phi @ (s.M @ acceleration + s.b.value())) + s.J @ vdot, robot.inverse_dynamics(robot.q, robot.v, vdot), 1e4)
+        near(
+            s.H @ (s.phi @ (s.M @ acceleration + s.b.value())) + s.J @ vdot + robot.rotor_forces(robot.v),
+            robot.inverse_dynamics(robot.q, robot.v, vdot),
+            1e4,
+        )
     near(both[0], both[1][order], 1e4)
     for name in ("V_tilde", "V_bar", "momentum_cross", "X_world", "Delta_theta_dot"):
         near(getattr(soa, name).dense(), getattr(own, name).dense()[np.ix_(order, order)])

@@ -120,6 +120,36 @@ def test_options_that_are_not_there(arm, q):
         arm.task_space(HAND, q, on_singular="damped").inertia_derivative.sum()
 
 
+def test_calls_that_go_state_by_state_tell_which():
+    """A mass on the axis of a massless body at the second of three states."""
+    model = pc.Multibody("gyroscope")
+    model.add_body("ring", None, "pin", axis=(0, 0, 1))
+    model.add_body("mass", "ring", "pin", axis=(0, 1, 0), mass=1.0, com=(0, 0, 1))
+    q, v = np.array([[0, 0.3], [0, 0.0], [0, 0.5]]), np.zeros((3, 2))
+    scene, told = pc.Scene(model).add(pc.effects.Gravity((0, 0, -9.81))), "state 1 of a batch of 3"
+    for call in (
+        lambda: scene.linearize(q, v),
+        lambda: model.linearize(q, v),
+        lambda: model.hybrid_dynamics_derivatives(q, v, v, v, "mass"),
+    ):
+        with pytest.raises(pc.SingularHingeError, match=told):
+            call()
+    bars = pc.chain(3)
+    bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+    square, still = [np.pi / 2, -np.pi / 2, -np.pi / 2], np.zeros((3, 3))
+    states = np.array([square, [0, 0, np.pi], square])  # the flat one is singular
+    for call in (
+        lambda: bars.linearize(states, still, loops=True),
+        lambda: bars.constrained_inverse_dynamics_derivatives(states, actuated="hinge0"),
+        lambda: bars.equilibrium(q0=states, loops=True),
+    ):
+        with pytest.raises(pc.EvaluationError, match=told):
+            call()
+    with pytest.raises(pc.EvaluationError, match="no equilibrium was found.*state 1 of a batch of 2"):
+        pc.chain(1).equilibrium(tau=[[0.0], [1.0]], q0=[0.1])
+    assert bars.linearize(states[:1], still[:1], loops=True)  # and of one state says no number
+
+
 def test_other_batched_calls_tell_the_state():
     """One massless body on a hinge of its own: ℳ is singular at every state, and each call says at which it found out first."""
     arm = pc.chain(2)

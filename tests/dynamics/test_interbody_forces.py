@@ -11,6 +11,7 @@ import pycraft as pc
 from pycraft import reference
 from support.differences import difference
 from support.mechanisms import build, every_kind, massless_inner_bodies, uniform_batch
+from support.rotors import gyroscopic, rotors_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::pycraft.ModelWarning")
 
@@ -98,10 +99,9 @@ def test_along_the_hinge_is_what_drives_it(model, how):
     tau, wrenches = drawn(model)
     f = model.interbody_forces(tau=tau, wrenches=wrenches, **how)
     H = model.soa.H.dense()
-    J = np.concatenate([hinge.rotor_inertia for hinge in model.hinges.values()])
     pushes = sum(model.jacobian(name, model.q, axes="aligned").T @ w for name, w in wrenches.items())
     vdot = model.forward_dynamics(model.q, model.v, tau + pushes)
-    close(H @ f.ravel() + J * vdot, tau, 1e-11 * (1 + np.abs(f).max()))
+    close(H @ f.ravel() + rotors_of(model) * vdot + gyroscopic(model, model.v), tau, 1e-11 * (1 + np.abs(f).max()))
 
 
 def test_single_precision(model):

@@ -150,10 +150,12 @@ def test_named_bodies():
     assert not pc.check(f"Ω({names[2]}, {names[2]}) = 2 Υ({names[2]})", model, states=1)
 
 
-def test_only_check_takes_them():
-    for call in (pc.truth, pc.repair, prove):
-        with pytest.raises(pc.EvaluationError, match="statements by block are checked, and not proved"):
+def test_what_does_not_take_them_says_so():
+    for call in (pc.truth, pc.repair):
+        with pytest.raises(pc.EvaluationError, match="statements by block are not mapped or repaired"):
             call("Ω(i,j) = Υ(i)ψ(i,j), i above j")
+    with pytest.raises(pc.EvaluationError, match="none of operators"):
+        prove("Ω(i,j) = Υ(i)ψ(i,j), i above j")
 
 
 def test_on_random_trees_hypotheses_and_relations_come_out(monkeypatch):

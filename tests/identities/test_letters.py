@@ -193,3 +193,117 @@ def test_a_determinant_by_block_has_its_sign():
     for n in (2, 3, 5):
         x = np.random.default_rng(n).normal(size=(n, n))[::-1].copy()
         assert np.prod(_pivots(x)) == pytest.approx(np.linalg.det(x), rel=1e-12)
+
+
+@pytest.mark.parametrize("text", BY_BLOCK)
+def test_recursions_are_proved(text):
+    if "path" in text or "outboard" in text:
+        with pytest.raises(ParseError, match="none of operators"):
+            prove(text)
+    else:
+        assert prove(text) and not prove(text).hypotheses
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "V*(k)f(k) = V*(k)f(k)",  # of every body, where V*f is the sum
+        "A := φ*H*; A*(k)P(k)A(k) = A*(k)P(k)A(k)",
+        "φ(k) = φ(k)",
+        "Ω(i,j) = Υ(i)ψ(i,j), i above j",
+        "Σ_{j∈C(k)} V(j) = V(k)",
+    ],
+)
+def test_what_is_no_statement_of_operators_is_not_proved_as_one(text):
+    with pytest.raises(ParseError, match="none of operators"):
+        prove(text)
+
+
+def test_wrong_recursions_are_not_proved():
+    for text in ("V(k) = φ*(℘(k),k)V(℘(k)) - H*(k)θ̇(k)", "Υ(k) = ψ*(℘(k),k)Υ(℘(k))ψ(℘(k),k)", "det ℳ = ∏_k det M(k)", "P(k) = M(k)"):
+        assert not prove(text)
+
+
+SCHOOLS = [  # dialect, text, hypotheses under which it is true
+    ("Park", r"G = (I-\Gamma)^{-1}", set()),
+    ("Park", "M = S^T G^T J G S", set()),
+    ("Park", r"\dot V = G(S\ddot q + \mathrm{ad}_{S\dot q}\Gamma V)", {"constant H"}),
+    ("Park", r"F = G^T(J\dot V - \mathrm{ad}_V^* J V)", set()),
+    ("Park", r"\tau = M\ddot q + C\dot q", {"constant H"}),
+    ("Saha", "I = N_d^T N_l^T M N_l N_d", set()),
+    ("Saha", "I = UDU^T", {"J = 0"}),
+    ("Saha", r"t = N_l N_d\dot q", set()),
+    ("Saha", r"I\ddot q + h = \tau", set()),
+    ("Saha", r"C = N^T(M\dot N + WMN)", set()),
+    ("Featherstone", r"H = \sum_i J_i^T I_i J_i", set()),
+    ("Featherstone", r"\Lambda^{-1} = JH^{-1}J^T", {"J = 0"}),
+    ("Featherstone", r"\tau = H\ddot q + C", set()),
+    ("Featherstone", r"v_i = {}^iX_{\lambda(i)} v_{\lambda(i)} + S_i\dot q_i", set()),
+    ("Featherstone", "U_i = I_i^A S_i", set()),
+    ("Featherstone", r"\tau_i = S_i^T f_i", set()),
+    ("Khatib", r"\bar J = A^{-1}J^T\Lambda", set()),
+    ("Khatib", r"A\ddot q + b + g = \Gamma", set()),
+    ("Khatib", r"\Lambda = (JA^{-1}J^T)^{-1}", {"J = 0"}),
+    ("Khatib", r"N\bar J = 0", {"J = 0"}),
+    ("Wensing", r"\dot H = C + C^T", set()),
+    ("Wensing", r"C = J^T(I\dot J + BJ)", set()),
+    ("Mueller", "J = AX", set()),
+    ("Mueller", r"\dot J = -AaJ", {"single-DOF hinges"}),
+    ("Mueller", r"C = -J^T(MAa + b^TM)J", {"single-DOF hinges"}),
+]
+
+
+@pytest.mark.parametrize(("dialect", "text", "hypotheses"), SCHOOLS, ids=[f"{d}: {t}" for d, t, _ in SCHOOLS])
+def test_equations_of_other_schools(dialect, text, hypotheses):
+    proof = prove(text, dialect=dialect)
+    assert proof and {*proof.hypotheses} == hypotheses
+    model = pc.tree([-1, 0, 1, 2, 3, 4], ["pin", "slider", "pin", "screw", "pin", "pin"], seed=2)
+    model.gravity = (1.0, 2.0, -9.8)
+    assert pc.check(text, model, states=1, search=False, dialect=dialect)
+
+
+@pytest.mark.parametrize(
+    ("dialect", "text"),
+    [
+        ("Park", "M = S^T G J G S"),
+        ("Khatib", r"J\bar J = 0"),
+        ("Mueller", r"\dot J = AaJ"),
+        ("Saha", "I = U^T D U"),
+        ("Wensing", r"\dot H = C - C^T"),
+    ],
+)
+def test_wrong_equations_of_other_schools(dialect, text):
+    try:
+        assert pc.check(text, states=2, search=False, dialect=dialect).verdict == "fails"
+    except ParseError as error:
+        assert "maps" in str(error)  # spaces that do not fit
+
+
+def test_both_letters_are_shown():
+    report = pc.check("M = S^T G^T J G S", states=1, dialect="Park")
+    assert report.statement == "dialect Park; M = S^T G^T J G S" and report.understood.startswith("H φ M φ* H* =")
+    assert pc.truth("M = S^T G^T J G S", smallest_case=False, dialect="Park") and pc.check(report.statement, states=1)
+    assert pc.repair("M = S^T G^T J G S^T", most=1, dialect="Park")[0].proof
+    with pytest.raises(ParseError, match="no dialect is called 'Parc'; there are Featherstone, Khatib"):
+        pc.check("M = M", dialect="Parc")
+
+
+def test_a_paper_in_a_dialect(tmp_path):
+    paper = Path(tmp_path / "p.tex")
+    paper.write_text(r"\[ L = I - \Gamma \] \[ G = L^{-1} \] \[ M = S^T G^T J G S \]", encoding="utf-8")
+    assert [e.verdict for e in check_paper(paper, states=1, dialect="Park").equations] == ["defines", "holds", "holds"]
+
+
+def test_a_forgotten_star_is_called_so():
+    from pycraft.proofs import exercise
+
+    task = exercise("HψMψ*H* == D", blank=2)
+    answer = task.answer("HψPH* + HPψH* - D")
+    assert answer.verdict == "wrong" and answer.text == "spaces do not fit: star missing on ψ, in the second term"
+    assert task.answer("HψPψH* + HPψH* - D").verdict == "unreadable"  # two slips
+
+
+def test_true_under_hypotheses_has_its_own_sign():
+    shown = pc.check("HψMψ*H* = D", states=1)._repr_html_()
+    assert "◐ true where J = 0" in shown and "✗" not in shown
+    assert "not met" not in str(prove("ℳ⁻¹ = [I-HψK]*D⁻¹[I-HψK]"))  # there is no model that could meet it

@@ -175,6 +175,21 @@ CHANGES = {
         ),
         ("a mass is carried without its place", "moment + carried[k].mass * X.p;", "moment;"),
     ],
+    "cpp/model/rotor_forces.h": [
+        ("rotors push a hinge the other way", "out[j + c] = -force[c];", "out[j + c] = force[c];", STATEMENT),
+        (
+            "rotors on travels do not gyrate",
+            "K[c] = c < 3 ? S(J[j + c] - J[j]) : J[j + c];",
+            "K[c] = c < 3 ? S(J[j + c] - J[j]) : S(0);",
+            STATEMENT,
+        ),
+        ("the rate of a rotor's force is of its momentum alone", "S(turned[c] + K[c] * bracket[c])", "turned[c]"),
+        (
+            "rotors have the bracket alone in Christoffel's matrix",
+            "(J[j + a] * along[b][a] - along[a][b] * J[j + b] + turned[b]) / S(2)",
+            "turned[b] / S(2)",
+        ),
+    ],
     "cpp/recursions/point_accelerations.h": [
         ("a hinge's own terms are never absorbed", "own == OwnTerms::absorbed && t[0] >= 0", "own != own && t[0] >= 0"),
     ],

@@ -15,7 +15,7 @@ CHANGES = {
         ("an event knows no state of its own", "t_ = c.t, x_ = c.x;", "t_ = c.t;", STATEMENT),
     ],
     "cpp/simulation/integrators/stepper.h": [
-        ("the step after a cut step is the cut one", "cut_ && abs(tried) < abs(h) ? h : tried", "tried"),
+        ("the step after a cut step is the cut one", "last && abs(tried) < abs(h) ? h : tried", "tried"),
         ("a longest step is none", "options_.longest > 0 && abs(h) > S(options_.longest)", "false"),
         ("a step counts from the run's start when it goes on", "if (resumed) pace_ = *resumed;", ";", STATEMENT),
         (

@@ -165,8 +165,12 @@ CHANGES = {
         ("spaces of LaTeX divide a text", 'if i and text[i - 1] == "\\\\" and c in ",;:{}":', "if False:"),
     ],
     "pycraft/identities/vocabulary.py": [
-        ("letters of the book are made of the user's", "dict(definitions=among, dialect={}, own=self._of_the_book())", "dict(dialect={})"),
-        ("a letter has its first meaning", "self._choice.get(name, 0)", "0"),
+        ("letters of the book are made of the user's", "dict(definitions=among, own=self._of_the_book())", "{}"),
+        ("a letter has its first meaning", "STANDARD[name].meanings[self._choice.get(name, 0)]", "STANDARD[name].meanings[0]"),
+    ],
+    "pycraft/proofs/lifting.py": [
+        ("what leads to the parent and back is no diagonal", 'f"blockdiag({joined})" if up and at == k else joined', "joined"),
+        ("rows are blocks", '(kind(name) == "blocks" or last and kind(name) == "vector")', "True"),
     ],
     "pycraft/identities/standard_letters.py": [
         ("forces without rotors", '"H f + J vdot"', '"H f"'),

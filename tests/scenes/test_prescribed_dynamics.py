@@ -8,6 +8,7 @@ from support.descriptions import KINDS
 from support.kernel_cases import MODELS
 from support.mechanisms import SEQUENCES, every_kind, massless_inner_bodies, rotors_on_some, with_hinges
 from support.oracle import ROUNDING, agree
+from support.rotors import crossed
 from support.scenes import hybrid_dynamics, prescribing, some_subhinges, subhinges
 
 FORMS = ["fast", "ud", "square-root"]
@@ -121,9 +122,10 @@ def test_rotors_that_a_scene_adds(how):
         inertia, ratio = rng.uniform(0.1, 2, model.nv), rng.uniform(-3, 3, model.nv)
         scene = scene_of(model, tau, [pc.effects.RotorInertia(inertia, gear_ratio=ratio)], **how)
         found = scene.evaluate(state.q, state.v)
-        vdot, _, condition = hybrid_dynamics(model, state.q, state.v, tau, zero, [], inertia * ratio**2)
+        gyroscopic = crossed(model, state.v) @ (inertia * ratio**2 * state.v)
+        vdot, _, condition = hybrid_dynamics(model, state.q, state.v, tau - gyroscopic, zero, [], inertia * ratio**2)
         agree(found.vdot, vdot, ROUNDING * condition)
-        agree(found.forces["rotor_inertia"], -inertia * ratio**2 * vdot, ROUNDING * condition)
+        agree(found.forces["rotor_inertia"], -inertia * ratio**2 * vdot - gyroscopic, ROUNDING * condition)
 
 
 def test_rotors_by_kernels_are_a_models_own():

@@ -191,3 +191,40 @@ def test_refusals(run, tmp_path, monkeypatch):
     with pytest.raises(pc.EvaluationError, match=r"pip install 'pycraft-soa\[usd\]'"):
         run.to_usd(tmp_path / "swing.usda")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_keys_stay_on_one_side_of_the_sphere(tmp_path):
+    """Two turns of a flywheel: q and -q are one rotation, and a player that goes from one to the other turns the long way round."""
+    pytest.importorskip("pygltflib")
+    model = pc.Multibody("flywheel")
+    model.add_body("wheel", hinge="pin", axis=(0.6, 0, 0.8), mass=1.0, inertia=np.eye(3))
+    run = pc.Scene(model).simulate(2.0, [0.0], [2 * np.pi], progress=False)
+    document, numbers = parsed(run.to_gltf(tmp_path / "wheel.glb", fps=20))
+    (rotation,) = [
+        document["animations"][0]["samplers"][channel["sampler"]]["output"]
+        for channel in document["animations"][0]["channels"]
+        if channel["target"]["path"] == "rotation"
+    ]
+    q = numbers(rotation)
+    np.testing.assert_allclose(np.sum(q[1:] * q[:-1], axis=1), np.cos(np.pi / 20), atol=4 * SINGLE)  # half of the angle between two frames
+    half = np.pi * np.arange(41) / 20
+    expected = np.column_stack([0.6 * np.sin(half), 0 * half, 0.8 * np.sin(half), np.cos(half)])
+    np.testing.assert_allclose(q * np.sign(q[0] @ expected[0]), expected, atol=1e-6)  # of a run by dopri5 at its tolerances
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_what_is_upright_is_upright(axis, tmp_path):
+    """Gravity along any axis: glTF's y and the axis that USD names are upright."""
+    pytest.importorskip("pygltflib")
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom
+
+    model = pc.chain(1)
+    model.gravity = -9.81 * np.eye(3)[axis]
+    run = pc.Scene(model).add(pc.effects.Gravity()).simulate(0.1, progress=False)
+    document, _ = parsed(run.to_gltf(tmp_path / "up.glb"))
+    np.testing.assert_allclose(matrix(*document["nodes"][0]["rotation"]) @ np.eye(3)[axis], [0, 1, 0], atol=1e-15)
+    stage = Usd.Stage.Open(str(run.to_usd(tmp_path / "up.usda")))
+    up = "XYZ".index(UsdGeom.GetStageUpAxis(stage))
+    root = np.array(UsdGeom.Xformable(stage.GetDefaultPrim()).ComputeLocalToWorldTransform(0)).T[:3, :3]
+    np.testing.assert_allclose(root @ np.eye(3)[axis], np.eye(3)[up], atol=1e-15)

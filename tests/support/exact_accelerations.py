@@ -54,7 +54,7 @@ def exact_accelerations(multibody, q, v, tau):
         epsilon, vdot = [None] * len(bodies), [None] * len(bodies)
         for k in reversed(bodies):
             z[k] = z[k] + P[k] @ a[k]
-            epsilon[k] = tau[o.coordinates[k]] - H[k] @ z[k]
+            epsilon[k] = (tau - o.b_J)[o.coordinates[k]] - H[k] @ z[k]
             if k in E:
                 z[o.parents[k]] = z[o.parents[k]] + E[k] @ (z[k] + G[k] @ epsilon[k])
         for k in bodies:

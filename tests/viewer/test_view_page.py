@@ -242,7 +242,10 @@ def test_bodies_are_coloured_by_their_shares(browser, view):
         until(page, "figure.shade !== null")
         shares = view.session.live.model.dof_shares(view.session.live.q)
         assert page.evaluate("figure.shade.values") == pytest.approx(list(shares.values))
-        assert page.evaluate("figure.shade.label") == "tr Υ(k)M(k): 2 of N = 2" and differing(first, pixels(page)) > MOVED
+        assert (
+            page.evaluate("figure.shade.label") == "degrees of freedom by body, tr Υ(k)M(k): 2 of N = 2"
+            and differing(first, pixels(page)) > MOVED
+        )
         colours = page.evaluate("[0, 1].map((k) => figure.shadeOf(k))")
         assert len(set(colours)) == 2 and colours[int(np.argmax(shares.values))] == "rgb(189, 223, 38)"
         page.select_option("#shade", "")
@@ -473,3 +476,30 @@ def test_what_acts_on_all_says_so(view):
     fields = {effect["name"]: effect["fields"] for effect in view.session.setup()["effects"]}
     assert {"name": "hinges", "text": "all hinges"} in fields["damping"]
     assert all("None" not in field.get("text", "") for own in fields.values() for field in own)
+
+
+def test_code_turns_the_camera(browser):
+    arm = pc.robots.panda()
+    with arm.view() as view, shown_page(browser, view) as page:
+        ready(page)
+        assert view.look("front", follow=arm.bodies["panda_link7"], zoom=2.0) is view
+        until(page, "figure.zoom === 2")
+        x, y, _ = page.evaluate("figure.seen(placed(figure.poses, 6, [0, 0, 0]))")
+        width, height = page.evaluate("[figure.canvas.clientWidth / 2, figure.canvas.clientHeight / 2]")
+        assert [x, y] == pytest.approx([width, height], abs=1.0) and page.input_value("#direction") == "front"
+        page.click("#look")  # whoever looks moves it, and it stays moved
+        view.label("a", (0, 0, 0))
+        until(page, "figure.extras.length === 1")
+        assert page.evaluate("figure.zoom") == 1
+        with shown_page(browser, view) as another:
+            ready(another)
+            assert another.evaluate("[figure.zoom, figure.follow]") == [2, "6"]
+        for wrong, words in ((("moon",), "there are 'from above'"), (("top", "moon"), "'robot', a body of 'panda'")):
+            with pytest.raises(pc.Error, match=words):
+                view.look(*wrong)
+        with pytest.raises(pc.EvaluationError, match="zoom=0"):
+            view.look(zoom=0)
+    from pycraft.viewer.session import DIRECTIONS
+
+    with pc.chain(1).view() as view, shown_page(browser, view) as page:
+        assert page.evaluate("Object.keys(VIEWS)") == list(DIRECTIONS)

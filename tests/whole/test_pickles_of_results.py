@@ -86,6 +86,8 @@ THINGS = {
     "a method": (lambda: rods().mass_matrix, lambda f: f([0.1, 0.2])),
     "a method of the class": (lambda: pc.Multibody.mass_matrix, lambda f: f(rods(), [0.1, 0.2])),
     "proof": (lambda: pc.prove("HψMψ*H* == D", pc.chain(3)), lambda x: (str(x), bool(x), x.recheck(), x.hypotheses)),
+    "proof by diagonal blocks": (lambda: pc.prove("blockdiag(psi) = I"), lambda x: (str(x), bool(x), x.recheck())),
+    "proof by a trace": (lambda: pc.prove("tr(MM) = tr(H phi M phi* H*)"), lambda x: (str(x), bool(x), x.recheck())),
     "proof of nothing": (lambda: pc.prove("H psi == H phi"), lambda x: (str(x), bool(x), x.difference)),
     "check": (lambda: pc.check("H G == I"), lambda x: (str(x), bool(x))),
     "counterexample": (lambda: pc.check("H phi == H psi").counterexample, lambda x: str(x)),

@@ -86,6 +86,7 @@ class Run {
     equations_.between(t_, to_);
     stepper_.plan(S(at_times_ ? to_double(to_) : std::min(stop, knot)));
     stepper_.begin(t_, x_, to_);
+    parted_ = false;
     while (!there() && end_.event < 0) step();
     if (end_.event >= 0) return;
     t_ = to_;
@@ -128,6 +129,7 @@ class Run {
   }
 
   void step() {
+    if (stepper_.cut() && !parted_) left_ = kept_, parted_ = true;  // a longer run took other steps from there
     keep();
     whole_ = fresh_ = false;
     stepper_.advance(t_, x_);
@@ -219,7 +221,8 @@ class Run {
   // A run that goes on takes the step again that the end of this one cut short, so that its steps are those of one that never ended.
   void close() {
     const bool completed = next_ >= plan_.times.size() || end_.event >= 0;
-    if (completed && (whole_ || !stepper_.cut())) keep();
+    if (completed && (whole_ || !stepper_.cut())) keep(), parted_ = false;
+    if (parted_) kept_ = left_;
     if (fresh_ && completed && !record().controlled) kept_.pace = {};
     end_.checkpoint = kept_;
     end_.cost.rejected = stepper_.rejected();
@@ -236,12 +239,12 @@ class Run {
   EventFunctions<S> events_;
   EventWatch<S> watch_;
   HermiteOutput<S> between_;
-  Checkpoint<S> kept_;
+  Checkpoint<S> kept_, left_;  // where the last step began; where the steps of this run parted from those of a longer one
   S t_, to_ = S(0);
   double stop_ = std::numeric_limits<double>::infinity();  // the next one
   size_t next_ = 1;
   int method_ = 0;
-  bool at_times_, forwards_ = true, stiff_ = false;
+  bool at_times_, forwards_ = true, stiff_ = false, parted_ = false;
   bool whole_ = false, fresh_ = false;  // where the run stands: a step had to end there; and what follows is counted anew
   std::chrono::steady_clock::time_point told_ = std::chrono::steady_clock::now();
 };

@@ -51,7 +51,7 @@ class Stepper {
   virtual void begin(const S& t, const State& x, const S& end) = 0;
   // One step; t is the end itself where it is reached. EvaluationError where no step can be taken.
   virtual void advance(S& t, State& x) = 0;
-  // Whether the last step was cut short by the end of its piece.
+  // Whether the last step was cut short by the end of its piece, or follows, in this piece, from an attempt that was: a longer piece has other steps then.
   bool cut() const { return cut_; }
   // x is another one than the last step ended with.
   virtual void forget() {}
@@ -134,7 +134,7 @@ class ControlledSteps : public Stepper<S> {
     whole_ = abs(last - t);
     pace_.size = resumed ? resumed->size : (last < t ? S(-1) : S(1)) * first_step(t, x);
   }
-  void begin(const S&, const State&, const S& end) override { end_ = end; }
+  void begin(const S&, const State&, const S& end) override { end_ = end, cut_ = false; }
   void forget() override { method_->forget(); }
   bool interpolate(const S& t, State& out) override { return method_->interpolate(t, out); }
   bool again(const S& from, const State& x, const S& to) override { return method_->again(from, x, to); }
@@ -144,18 +144,19 @@ class ControlledSteps : public Stepper<S> {
     S& h = pace_.size;
     for (int refusals = 0;;) {
       if (options_.longest > 0 && abs(h) > S(options_.longest)) h = (h < S(0) ? S(-1) : S(1)) * S(options_.longest);
-      cut_ = abs(h) >= abs(end_ - t);
-      S tried = cut_ ? S(end_ - t) : h;
+      const bool last = abs(h) >= abs(end_ - t);
+      cut_ |= last;
+      S tried = last ? S(end_ - t) : h;
       const S before = tried, from = t;
       kept_ = x;
       const bool taken = method_->attempt(t, x, tried);
       if (taken && finite_motion(equations_, x)) {
-        if (cut_) t = end_;
-        short_ = !cut_ && abs(t - from) < shortest(t) ? short_ + 1 : 0;
+        if (last) t = end_;
+        short_ = !last && abs(t - from) < shortest(t) ? short_ + 1 : 0;
         count(method_->share_of_stability());
         if (short_ == patience) refuse_step(t, x, std::to_string(patience) + " steps in a row were as short as " + short_number(to_double(before)) + " s");
         // A step cut short tells only whether the next may be longer.
-        h = cut_ && abs(tried) < abs(h) ? h : tried;
+        h = last && abs(tried) < abs(h) ? h : tried;
         return;
       }
       ++rejected_;
@@ -257,7 +258,7 @@ class FixedSteps : public Stepper<S> {
   void plan(const S& whole) override { whole_ = whole; }
   void begin(const S& t, const State&, const S& end) override {
     using std::abs;
-    end_ = end;
+    end_ = end, cut_ = false;
     if (!resumed_) {
       pace_ = {end < t ? -S(options_.step) : S(options_.step), t, 0};
       if (std::isfinite(to_double(whole_))) {

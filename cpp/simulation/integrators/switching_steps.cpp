@@ -24,13 +24,14 @@ class SwitchingSteps : public Stepper<double> {
     told();
   }
   void begin(const double& t, const State& x, const double& end) override {
-    from_ = t, end_ = end;
+    end_ = end, took_ = now_, cut_ = false;
     now().begin(t, x, end);
     told();
   }
   void advance(double& t, State& x) override {
     took_ = now_;
     now().advance(t, x);
+    cut_ |= now().cut();
     if (now_ == 0 && now().held() >= enough)
       leave_explicit(t, x);
     else if (now_ == 1 && ++counted_ % every == 0)
@@ -73,13 +74,12 @@ class SwitchingSteps : public Stepper<double> {
   }
   void told() {
     pace_ = {now().pace().size, 0, now_ + 2 * (now_ == 0 ? steps_[0]->counts() : counted_)};
-    cut_ = steps_[took_]->cut();
     rejected_ = steps_[0]->rejected() + steps_[1]->rejected();
   }
 
   DecayFinder finder_;
   std::unique_ptr<ControlledSteps<double>> steps_[2];
-  double last_ = 0, from_ = 0, end_ = 0;
+  double last_ = 0, end_ = 0;
   int now_ = 0, took_ = 0;  // which of them takes the next step, and which took the last
   long counted_ = 0;
 };

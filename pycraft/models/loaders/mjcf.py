@@ -170,12 +170,19 @@ class _Reader:
         options: dict[str, Any] = dict(hinge=_KINDS[kinds[0]] if len(kinds) == 1 else "custom")
         options["rotor_inertia"] = self.armature[dofs]
         if kinds == [_FREE]:  # its coordinates are the body's pose in the world: the body's pos and quat are in qpos0 only
-            if np.any(self.armature[dofs]):
+            options["rotor_inertia"] = np.roll(self.armature[dofs], 3)  # of turns, then of travels
+            if any(np.ptp(triple) for triple in (self.armature[dofs][:3], self.armature[dofs][3:])):
                 self.warnings.append(
-                    f"{self.path}: the free joint of body {self.bodies[b]!r} has armature; here it acts along the body's axes, "
-                    "in MuJoCo along the world's, so that bias forces differ by armature times ω × v"
+                    f"{self.path}: the free joint of body {self.bodies[b]!r} has armatures that differ among turns or among travels; "
+                    "here they act along the body's axes, and with v ×* (Jv), in MuJoCo travels' along the world's, and without"
                 )
             return options
+        firsts = [int(m.jnt_dofadr[j]) for j, kind in zip(joints, kinds, strict=True) if kind == _BALL]
+        if any(np.ptp(self.armature[first : first + 3]) for first in firsts):
+            self.warnings.append(
+                f"{self.path}: the ball joint of body {self.bodies[b]!r} has armatures that differ; "
+                "ω × Jω of them is in the equations of motion here, and in MuJoCo's it is not"
+            )
         placement, subhinges = self._absorb_references(placement, joints)
         options["placement"] = placement
         if len(kinds) == 1:

@@ -5,7 +5,7 @@ const KEPT = 600; // states of the plots
 const SLIDERS = 60; // sliders that are shown at once: of more, those of the picked body
 const byId = (id) => document.getElementById(id);
 let setup = JSON.parse(byId("data").textContent), state = null, picked = -1, busy = false, longest = {};
-let figure = null, kept = [], energies = null, chosen = null, looked = 0;
+let figure = null, kept = [], energies = null, chosen = null, looked = 0, looking = null;
 
 async function ask(path, body) {
   const options = body ? { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } } : {};
@@ -35,6 +35,7 @@ function build() {
   byId("said").textContent = setup.effects.filter((effect) => effect.on).map((effect) => effect.name).join(", ") || "no effects";
   byId("loops").textContent = setup.loops.length ? `the rest follows on the loops: ${setup.loops.join(", ")}` : "";
   figure.extras = setup.extras;
+  if (setup.camera && setup.camera.count !== looking) lookAs(setup.camera);
   figure.ghosts = setup.ghost ? [{ data: setup.ghost, poses: new Float32Array() }] : [];
   const ghost = byId("ghost");
   ghost.replaceChildren(new Option("none", ""), ...setup.ghosts.map((name) => new Option(name, name)));
@@ -47,6 +48,17 @@ function build() {
     on.addEventListener("change", () => act("effect", { name: effect.name, on: on.checked }));
     for (const field of effect.fields) buildField(box, effect, field);
   }
+}
+
+// As code has it: a direction, what is followed, and how near.
+function lookAs({ direction, follow, zoom, count }) {
+  looking = count;
+  figure.setFollow(follow);
+  figure.lookFrom(VIEWS[direction]);
+  figure.zoom = zoom;
+  byId("follow").value = follow;
+  if (byId("direction")) byId("direction").value = direction;
+  figure.draw();
 }
 
 function buildField(box, effect, field) {
