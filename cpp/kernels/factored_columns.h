@@ -5,6 +5,10 @@
 // Where one has a rotor, and of screws, the hinge's row is one more, and P⁺ keeps six columns. U is lower triangular in what rows are left:
 // angular ones `turns`, then linear ones `slides`. On the way to the parent's origin only the linear part of a column is shifted.
 //
+// Of pins about coordinate axes of the parent linear rows come first, and of these those across the axis. Then columns of what pushes along the
+// axis, and of couples that turn it over, have exact zeros in the pin's plane, which other pins about the same axis keep: a load that is heavy
+// across the plane, where nothing lets it go, is not felt in it.
+//
 // A link's columns: 0 to 5 what the link that follows it leaves, 6 to 11 its own inertia's, eight for each other link that hangs on it, and its
 // rotor's in a place that is left (link_factors.cpp).
 #pragma once
@@ -14,14 +18,20 @@
 
 namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET {
 
-// Rows n of a triangle: from `first` on, those of `turns` axes and then of `slides`.
+// Rows n of a triangle: `turns` axes from row `turned` on and `slides` from row `moved` on, from `first` on those of the two that come first.
 struct Left {
   int n, first, turns, slides;
   int turn[3], slide[3];
+  bool level = false;  // slides come first
+  constexpr int turned() const { return level ? first + slides : first; }
+  constexpr int moved() const { return level ? first : first + turns; }
 };
+template <class Kind>
+inline constexpr bool is_level = Kind::pin && !std::is_same_v<Kind, TurnedPin>;
 template <class Kind, bool kept>
 constexpr Left rows_left() {
   constexpr int K = Kind::row, i = (K + 1) % 3, j = (K + 2) % 3;
+  if (is_level<Kind>) return kept ? Left{7, 1, 3, 3, {K, i, j}, {i, j, K}, true} : Left{6, 1, 2, 3, {i, j, 0}, {i, j, K}, true};
   if (Kind::pin) return kept ? Left{7, 1, 3, 3, {K, i, j}, {0, 1, 2}} : Left{6, 1, 2, 3, {i, j, 0}, {0, 1, 2}};
   if (Kind::nv == 1) return kept ? Left{7, 1, 3, 3, {0, 1, 2}, {0, 1, 2}} : Left{6, 1, 3, 2, {0, 1, 2}, {0, 1, 0}};
   return Kind::nv == 3 ? Left{6, 3, 0, 3, {0, 0, 0}, {0, 1, 2}} : Left{6, 6, 0, 0, {0, 0, 0}, {0, 0, 0}};
@@ -81,27 +91,33 @@ template <class Kind, bool kept, int n, class S, class Rotation, class F>
   constexpr Left of = rows_left<Kind, kept>();
   static_assert(of.n == n);
   each_of<of.turns>([&](int p) {
-    const int r = of.first + p;
+    const int r = of.turned() + p;
     Vector3<S> turned = rotation.column(of.turn[p]), moved = Vector3<S>::zero();
     S rho = L.lower[r][n] - m.turning[of.turn[p]];
     each_of<3>([&](int q) {
       if (q <= p || q >= of.turns) return;
-      const S& x = L.lower[r][of.first + q];
+      const S& x = L.lower[r][of.turned() + q];
       rotation.add_column(of.turn[q], x, turned), rho -= x * m.turning[of.turn[q]];
     });
-    each_of<of.slides>([&](int q) { rotation.add_column(of.slide[q], L.lower[r][of.first + of.turns + q], moved); });
+    if constexpr (of.level) return f(r - of.first, turned, moved, rho, L.weight[r]);
+    each_of<of.slides>([&](int q) { rotation.add_column(of.slide[q], L.lower[r][of.moved() + q], moved); });
     each_of<3>([&](int i) { rho -= moved[i] * m.sliding[i]; });
-    f(p, turned + cross(arm, moved), moved, rho, L.weight[r]);
+    f(r - of.first, turned + cross(arm, moved), moved, rho, L.weight[r]);
   });
   each_of<of.slides>([&](int p) {
-    const int r = of.first + of.turns + p;
-    Vector3<S> moved = rotation.column(of.slide[p]);
+    const int r = of.moved() + p;
+    Vector3<S> moved = rotation.column(of.slide[p]), turned = Vector3<S>::zero();
     each_of<3>([&](int q) {
-      if (q > p && q < of.slides) rotation.add_column(of.slide[q], L.lower[r][of.first + of.turns + q], moved);
+      if (q > p && q < of.slides) rotation.add_column(of.slide[q], L.lower[r][of.moved() + q], moved);
     });
     S rho = L.lower[r][n];
     each_of<3>([&](int i) { rho -= moved[i] * m.sliding[i]; });
-    f(of.turns + p, cross(arm, moved), moved, rho, L.weight[r]);
+    if constexpr (!of.level) return f(r - of.first, cross(arm, moved), moved, rho, L.weight[r]);
+    each_of<of.turns>([&](int q) {
+      const S& x = L.lower[r][of.turned() + q];
+      rotation.add_column(of.turn[q], x, turned), rho -= x * m.turning[of.turn[q]];
+    });
+    f(r - of.first, turned + cross(arm, moved), moved, rho, L.weight[r]);
   });
 }
 

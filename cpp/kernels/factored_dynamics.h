@@ -19,13 +19,17 @@ template <class S>
 struct FactoredWork {
   ForwardWork<S> forward;
   S* columns;  // of links that branch
+  S* leaking;  // of every link (factored_pivots.h)
   template <class T>
-  static size_t own_size(const Links<T>& links) { return size_t(links.fours) * four * sizeof(S); }
+  FactoredWork(const Links<T>& links, const ForwardWork<S>& forward, T* own)
+      : forward(forward), columns(reinterpret_cast<S*>(own)), leaking(columns + size_t(links.fours) * four) {}
+  template <class T>
+  static size_t own_size(const Links<T>& links) { return (size_t(links.fours) * four + links.count) * sizeof(S); }
   template <class T>
   static size_t size(const Links<T>& links) { return own_size(links) + ForwardWork<S>::size(links); }
   template <class T>
   static FactoredWork in(const Links<T>& links, T* work) {
-    return {{links, work}, reinterpret_cast<S*>(work + ForwardWork<S>::size(links) / sizeof(T))};
+    return {links, {links, work}, work + ForwardWork<S>::size(links) / sizeof(T)};
   }
 };
 
@@ -37,8 +41,8 @@ template <class Kind, bool kept, int n, class S, class T>
   w.inverse = L.inverse[0];
   if constexpr (Kind::pin && !kept) w.angular[K] = L.products[0];
   if constexpr (!Kind::pin && !kept) w.linear[K] = L.products[0];
-  each_of<of.turns>([&](int p) { w.angular[of.turn[p]] = L.products[of.first + p]; });
-  each_of<of.slides>([&](int p) { w.linear[of.slide[p]] = L.products[of.first + of.turns + p]; });
+  each_of<of.turns>([&](int p) { w.angular[of.turn[p]] = L.products[of.turned() + p]; });
+  each_of<of.slides>([&](int p) { w.linear[of.slide[p]] = L.products[of.moved() + p]; });
   const S along = Kind::pin ? P.n[K] : S(S(link.turn) * P.n[K] + S(link.travel) * P.f[K]);
   const S innovation = tau - along, rate = innovation * w.inverse;
   w.innovation = innovation + L.products[n];
@@ -101,10 +105,11 @@ template <class Kind, class S, class T>
   }
 }
 
-// The hinge of link k eliminated from its columns; P: y and how sure pivots are. to: where P⁺ goes, among the columns of its parent.
+// The hinge of link k eliminated from its columns; P: y and how sure pivots are. to: where P⁺ goes, among the columns of its parent. leaking: of
+// every link.
 template <bool roots, class Kind, bool kept, class S, class T>
 [[gnu::flatten]] void eliminate_factored(const Link<T>& link, const LinkFactors<T>* factors, int k, const Links<T>& links, const States<T>& at, const S& gone, const LinkColumns<S>& C, S* to, ForwardLink<S>& __restrict w,
-                                         ForwardMultiple<S>* __restrict multiple, Inertia<S>& __restrict P, typename S::Bits& sound) {
+                                         ForwardMultiple<S>* __restrict multiple, S* leaking, Inertia<S>& __restrict P, typename S::Bits& sound) {
   const LinkFactors<T>& own = factors[k];
   const auto force = [&](int i) { return at.u ? gathered<S>(at.u + link.v + i, at.u_stride, at.states) : S(0); };
   Triangle<rows_left<Kind, kept>().n, S> L;
@@ -117,7 +122,8 @@ template <bool roots, class Kind, bool kept, class S, class T>
   else
     orthogonalise(C.at, C.fours, L);
   if constexpr (Kind::nv == 1) {
-    sound = sound & judge_one<Kind, kept>(link, own, links, gone, L, P);
+    sound = sound & judge_one<Kind, kept>(link, own, links, gone, L, leaking[k], P);
+    if constexpr (is_level<Kind> && !kept) pass_leak(link, own, links, L, leaking[k], leaking);
     innovate_factored<Kind, kept>(link, L, S(S(link.sign) * force(0)), w, P);
   } else if constexpr (Kind::nv == 3) {
     innovate_ball(L, force, *multiple, P);
@@ -141,8 +147,10 @@ template <bool roots, class S, class T>
   typename S::Bits sound = S::all();
   alignas(64) S hand[2][4 * four];  // columns of links that do not branch, in turn
   const auto columns_of = [&](int k) { return links.link[k].branches ? w.columns + factors[k].room * four : hand[k % 2]; };
-  for (int k = 0; k < links.count; ++k)
+  for (int k = 0; k < links.count; ++k) {
+    start_leaks(links, k, w.leaking);
     if (links.link[k].branches) carry_nothing(w.forward.branch[k]);
+  }
   Inertia<S> P;
   carry_nothing(P);
   for (int k = links.count - 1; k >= 0; --k) {
@@ -168,7 +176,7 @@ template <bool roots, class S, class T>
       else
         to = w.columns + own.to * four, clear_four(to + four);
     }
-    const auto eliminate = [&](auto kind, auto kept) { eliminate_factored<roots, decltype(kind), decltype(kept)::value>(link, factors, k, links, at, gone, C, to, of, w.forward.of(link), P, sound); };
+    const auto eliminate = [&](auto kind, auto kept) { eliminate_factored<roots, decltype(kind), decltype(kept)::value>(link, factors, k, links, at, gone, C, to, of, w.forward.of(link), w.leaking, P, sound); };
     with_step(link.step, [&](auto kind) {
       if constexpr (decltype(kind)::nv == 1) {
         if (own.kept) return eliminate(kind, std::true_type{});

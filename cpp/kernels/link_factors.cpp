@@ -71,14 +71,17 @@ OwnInertia own_inertia(const MassOnLink* begin, const MassOnLink* end) {
   return own;
 }
 
-// The order of rows (n; f), and whether the hinge's stands by itself.
+// The order of rows (factored_columns.h), and whether the hinge's stands by itself.
 template <class T>
 void order_rows(const Link<T>& link, LinkFactors<T>& own) {
   own.kept = link.rotor || (link.step == Step::helix && link.turn != T(0));
-  int order[6] = {0, 1, 2, 3, 4, 5};
-  if (link.step <= Step::turned_pin) {
-    const int axis = std::min(static_cast<int>(link.step), 2);
-    for (int i = 0; i < 3; ++i) order[i] = (axis + i) % 3;
+  int order[6] = {0, 1, 2, 3, 4, 5};  // n, then f
+  if (link.step < Step::turned_pin) {
+    const int K = static_cast<int>(link.step), i = (K + 1) % 3, j = (K + 2) % 3;
+    const int alone[6] = {K, 3 + i, 3 + j, 3 + K, i, j}, beside[6] = {3 + i, 3 + j, 3 + K, K, i, j};
+    std::copy_n(own.kept ? beside : alone, 6, order);
+  } else if (link.step == Step::turned_pin) {
+    for (int i = 0; i < 3; ++i) order[i] = (2 + i) % 3;
   } else if (link.step == Step::helix && !own.kept) {
     const int slides[6] = {5, 0, 1, 2, 3, 4};
     std::copy_n(slides, 6, order);

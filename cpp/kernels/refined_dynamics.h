@@ -48,9 +48,10 @@ template <class S, class V, class T>
     }
     const S rounding = rounding_along_correction(links, at, w, scale, DBL_EPSILON / 2, force_unit<S, V>);
     sound = sound & (~open | greater(S(DBL_MAX), rounding));
-    // Links of one coordinate each add up more than hinges of several: what is to be left out though it counts, the general recursions judge.
+    // Links of one coordinate each add up more than hinges of several: what is to be left out though it counts, the general recursions judge where
+    // so much more may decide.
     const Bits beyond = greater(largest * square, rounding);
-    sound = sound & (~open | beyond | ~greater(largest, S(S(64 * DBL_EPSILON) * solution)));
+    if (links.several) sound = sound & (~open | beyond | ~greater(largest, S(S(64 * DBL_EPSILON) * solution)) | greater(rounding, S(S(6) * largest * square)));
     open = open & beyond & sound;
     const S now = largest * square * largest;  // |δ|²
     if (step > 0) open = open & greater(last, S(S(4) * now));
@@ -73,7 +74,7 @@ unsigned refined_dynamics(const Links<typename S::Scalar>& links, const States<t
 template <class S, class V, bool roots>
 unsigned refined_dynamics_by_factors(const Links<typename S::Scalar>& links, const States<typename S::Scalar>& at, double* out, size_t stride, typename S::Scalar* work) {
   const RefinedWork<S, V> w(links, work);
-  const FactoredWork<S> factored{w.forward, reinterpret_cast<S*>(work + RefinedWork<S, V>::size(links) / sizeof(typename S::Scalar))};
+  const FactoredWork<S> factored(links, w.forward, work + RefinedWork<S, V>::size(links) / sizeof(typename S::Scalar));
   return refine_eliminated(links, at, w, move_and_eliminate<roots>(links, at, factored), out, stride);
 }
 

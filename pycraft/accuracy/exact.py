@@ -36,7 +36,7 @@ def _rotor_forces(model: Any, v: np.ndarray) -> list[np.ndarray]:
     """-v ×* (J v) of rotors on balls and free hinges: doubles (nv,), each of what the sum of those before has left."""
     if not model.rotor_forces(v).any():
         return []
-    parts = []
+    parts: list[np.ndarray] = []
     with mpmath.workprec(BITS):
         left = np.concatenate([np.zeros(0, object), *(_of_hinge(hinge, v) for hinge in model.hinges.values())])
         while any(left) and len(parts) < BITS // 53:

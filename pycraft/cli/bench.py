@@ -201,6 +201,25 @@ def ud_at_worst(seconds: float) -> list[Figure]:
     return figures
 
 
+def heavy_tips(seconds: float) -> list[Figure]:
+    """Chains of rods with a heavy tip over `fast` without one, which costs the same: no ratio makes a way dear."""
+    figures = []
+    for n in (4, 8, 20):
+        even = chain(n)
+        at, plain = _states(even), partial(_core.time_forward, even)
+        for way, ratios in (("ud", (1e8, 1e12, 1e16)), ("fast + 1 refinement", (1e3,))):
+            options, _ = WAYS[way]
+            for ratio in ratios:
+                model = chain(n)
+                tip = model.bodies[f"body{n - 1}"]
+                tip.mass, tip.inertia = ratio, ratio * np.asarray(tip.inertia)
+                fast, own = in_turn(seconds, partial(plain, *at), partial(_core.time_forward, model, *at, **options))
+                figures.append(
+                    Figure(f"chain of {n}, tip {ratio:.0e}: {way} over fast", own / fast, "x", UD_AT_WORST, f"{1e6 * own:.2f} us")
+                )
+    return figures
+
+
 def accuracy(seconds: float = 0.2) -> list[Figure]:
     """What accuracy costs: forward dynamics in every way over `fast` in double, and batches in packs."""
     from ..models import robots
@@ -230,7 +249,7 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
                 note = f"{1e6 * own:.2f} us a state"
                 figures.append(Figure(f"{name}: {form} in packs, {precision}, over one by one in double", own / fast, "x", None, note))
             figures.append(Figure(f"{name}: {form} in batches, single over double", packed[1] / packed[0], "x", 1.0))
-    return figures + ud_at_worst(seconds)
+    return figures + ud_at_worst(seconds) + heavy_tips(seconds)
 
 
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:

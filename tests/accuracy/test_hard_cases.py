@@ -11,6 +11,8 @@ from pycraft.accuracy.hard_cases.catalogue import catalogue
 
 SEEDS, STEPS, SIZES = 12, 20_000, (2, 8, 16, 64)
 CASES = catalogue(SIZES)
+MORE = {"10 links, tip 1e+12, coordinate axes": 60}
+"""Of 12 the 95th percentile is the largest, which here is one of the one in fifty that are stretched: of so many it is not."""
 EVERYDAY = ("massless bodies and vanishing pivots", "configurations")
 
 
@@ -21,7 +23,7 @@ def marked(case):
 
 @pytest.mark.parametrize("case", [marked(case) for case in CASES])
 def test_every_bound_holds(case):
-    results = stability.run(SEEDS, STEPS, cases=[case], peers=False)
+    results = stability.run(MORE.get(case.name, SEEDS), STEPS, cases=[case], peers=False)
     assert len(results) >= 1
     assert not results.failures, [(row["method"], row["failed"], row["text"]) for row in results.failures]
 

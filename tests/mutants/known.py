@@ -183,6 +183,7 @@ AREAS = {
     "cpp/kernels/forward_dynamics.h": ["dynamics/test_kernels.py", "dynamics/test_kernels_digits.py", "dynamics/test_packs.py"],
     "cpp/kernels/factored_dynamics.h": ["dynamics/test_kernels_factored.py", "sweeps/test_singular_forms.py"],
     "cpp/kernels/factored_columns.h": ["dynamics/test_kernels_factored.py"],
+    "cpp/kernels/factored_pivots.h": ["dynamics/test_kernels_factored.py", "sweeps/test_heavy_in_a_plane.py"],
     "cpp/kernels/reflected_rows.h": ["dynamics/test_kernels_factored.py"],
     "cpp/kernels/link_factors.cpp": ["dynamics/test_kernels_factored.py"],
     "cpp/dynamics/batch_dynamics.cpp": ["dynamics/test_kernels_factored.py"],

@@ -259,6 +259,10 @@ CHANGES = {
     "cpp/kernels/factored_columns.h": [
         ("columns of turns forget what the hinge turns by", "L.lower[r][n] - m.turning[of.turn[p]]", "L.lower[r][n]"),
     ],
+    "cpp/kernels/factored_pivots.h": [
+        ("what a load turns by leaks into no plane", "leaking[link.parent] = S(1);", ";", STATEMENT),
+        ("what leaks into a plane stops at the next pin", "greater(L.weight[1], least) & greater(L.weight[2], least)", "S::all()"),
+    ],
     "cpp/kernels/reflected_rows.h": [
         (
             "a column that is through stays",

@@ -46,6 +46,9 @@ def cases() -> list[Case]:
     out.append(
         _case("10 links, tip 1e+12, coordinate axes", "the same, axes along y, x, z", 10, 1e12, partial(_tip, 10, 1e12), "coordinate")
     )
+    across = "across the plane of the pins nothing lets the tip go: all of it beside a light link"
+    for n in (10, 100):
+        out.append(_case(f"{n} links, tip 1e+12, parallel axes", across, n, 1e12, partial(_tip, n, 1e12), "parallel"))
     straight = _case("100 links straight, tip 1e+09", "straight and heavy at the tip", 100, 1e9, partial(_tip, 100, 1e9))
     out.append(replace(straight, draw=partial(_draw, partial(_tip, 100, 1e9), "random", 0.0, False)))
     for n in (7, 10, 13, 16):

@@ -17,10 +17,10 @@ OFFSET, CENTRE = np.array([0.2, 0.1, 1.0]), np.array([0.1, 0.05, 0.5])
 
 
 def links(masses: Sequence[float], lengths: Sequence[float], rng: np.random.Generator, axes: str = "random") -> Multibody:
-    """A chain of solid links on pins: axes uniform on the sphere, or with axes="coordinate" along y, x, z in turn."""
+    """A chain of solid links on pins: axes uniform on the sphere, "coordinate": along y, x, z in turn, "parallel": all along z."""
     model = Multibody(f"chain of {len(masses)} links")
     for k, (mass, length) in enumerate(zip(masses, lengths, strict=True)):
-        axis = np.eye(3)[(1, 0, 2)[k % 3]] if axes == "coordinate" else rng.normal(size=3)
+        axis = rng.normal(size=3) if axes == "random" else np.eye(3)[2 if axes == "parallel" else (1, 0, 2)[k % 3]]
         model.add_body(
             f"link{k}", f"link{k - 1}" if k else None, "pin", hinge_name=f"hinge{k}", axis=axis / np.linalg.norm(axis),
             position=OFFSET * lengths[k - 1] if k else (0, 0, 0), mass=mass, com=CENTRE * length, inertia=mass * length**2 * SHAPE,
