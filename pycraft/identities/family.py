@@ -20,6 +20,7 @@ from .. import _core
 from ..models.generators import tree
 from ..state import State
 from .parse import Statement, Statements
+from .part_letters import HYBRID
 
 _SIZES = {kind: row.nv for kind, row in _core.hinge_kinds.items()} | {"custom": 3}
 DOF = dict(sorted(_SIZES.items(), key=lambda item: item[1]))
@@ -185,7 +186,7 @@ def named_vectors(read: Statement) -> dict[str, str]:
             todo += side.operands()
         elif isinstance(side, _core.Operator):
             todo += side.children
-            if side.kind == "vector":
+            if side.kind == "vector" and side.name not in HYBRID:
                 found[side.name] = side.codomain.name
     return found
 

@@ -1,18 +1,14 @@
-"""Reports in a terminal: 80 columns, symbols that a fixed-width font can show, what matters never cut."""
+"""Reports in a terminal: 80 columns, letters as the book has them, what matters never cut."""
 
 from __future__ import annotations
 
-import re
 import textwrap
 import unicodedata
 from collections.abc import Sequence
-from functools import lru_cache
 from io import StringIO
 from typing import Any
 
 from rich.cells import cell_len
-
-from .. import _core
 
 WIDTH = 80
 STYLES = {
@@ -24,30 +20,14 @@ STYLES = {
     "waiting": "dim",
     "undefined": "yellow",
 }
-_ACCENTS = {"\u0303": "_tilde", "\u0304": "_bar", "\u0305": "_bar", "\u0307": "_dot", "\u0308": "_ddot", "\u0302": "_hat"}
-_ACCENTED = re.compile(f"(\\w)([{''.join(_ACCENTS)}])")
-
-
-@lru_cache(maxsize=1)
-def _letters() -> list[tuple[str, str]]:
-    """Letters that only a combining accent can write, and their ASCII names: the longest first."""
-    known = [(unicodedata.normalize("NFC", s.text), s.name) for s in _core.symbols]
-    return sorted(((s, n) for s, n in known if any(unicodedata.combining(c) for c in s)), key=lambda e: -len(e[0]))
 
 
 def monospace(text: str) -> str:
-    """The text without combining accents, which terminals print over the next letter: φ̃ as phi_tilde, Ṽ in one character, p̈ as p_ddot.
+    """The text as a terminal is given it: letters and their accents composed where there is one character for both.
 
-    It reads back as the same statement.
+    An accent that has none, as in φ̃, is left: a terminal that knows Unicode sets it on its letter, as pages and notebooks do.
     """
-    text = unicodedata.normalize("NFC", text)
-    if not any(map(unicodedata.combining, text)):
-        return text
-    for shown, name in _letters():
-        # A space where the name would run into its neighbours.
-        text = re.sub(rf"(?<=[^\W_]){re.escape(shown)}", f" {name}", text)
-        text = re.sub(rf"{re.escape(shown)}(?=[^\W_])", f"{name} ", text).replace(shown, name)
-    return _ACCENTED.sub(lambda found: found[1] + _ACCENTS[found[2]], text)
+    return unicodedata.normalize("NFC", text)
 
 
 def wrapped(line: str, width: int = WIDTH) -> str:

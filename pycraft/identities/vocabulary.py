@@ -20,6 +20,7 @@ import numpy as np
 from .. import _core
 from .any_nodes import any_nodes
 from .directions import COORDINATES, along, coordinates_meant
+from .part_letters import part, part_names, text_of_part
 from .spelling import Spelled
 from .standard_letters import STANDARD
 
@@ -111,7 +112,7 @@ class Vocabulary:
         self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension}
         self._base = dict(self._own)
         self._own |= {"vdot": _core.vector("vdot", operators.Theta), **(extra or {})}
-        self._operators = operators
+        self._operators, self._parts = operators, part_names(operators)
         self._definitions: tuple[Any, ...] = ()
         self._choice: Mapping[str, int] = {}
         self._seen = math.inf
@@ -147,7 +148,7 @@ class Vocabulary:
     @property
     def names(self) -> set[str]:
         """Names that stand alone, without arguments."""
-        letters = {*_NAMES, *_ALIASES, *STANDARD, *self.own}
+        letters = {*_NAMES, *_ALIASES, *STANDARD, *self._parts, *self.own}
         numbers = {"I", "N"} - {d.name for d in self._definitions}
         return letters | {f"{name}_dot" for name in letters - numbers if not name.endswith("dot")}
 
@@ -174,6 +175,10 @@ class Vocabulary:
             among = tuple(d for d in self._definitions if d.name in STANDARD and not d.of_the_book)
             scope = dict(definitions=among, own=self._of_the_book())
             return self._defined(name, STANDARD[name].meanings[self._choice.get(name, 0)], scope)
+        if name in self._parts:
+            what = text_of_part(name)
+            scope = dict(definitions=(), own=self._of_the_book())
+            return part(self._operators, name) if what is None else self._defined(name, what, scope)
         if name.endswith("_dot") and name.removesuffix("_dot") in self.names:
             return self.derivative(self.operator(name.removesuffix("_dot")), "t")
         raise ParseError(self.unknown(name))

@@ -307,3 +307,31 @@ def test_true_under_hypotheses_has_its_own_sign():
     shown = pc.check("HψMψ*H* = D", states=1)._repr_html_()
     assert "◐ true where J = 0" in shown and "✗" not in shown
     assert "not met" not in str(prove("ℳ⁻¹ = [I-HψK]*D⁻¹[I-HψK]"))  # there is no model that could meet it
+
+
+HYBRID = [
+    "ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp = H_pY*MYH_p*,  Y = ψ_f* - Ω_fP_f",
+    "(ℳ_ff+J_f)⁻¹ℳ_fp = (K_f*ψ_f* + [I-H_fψ_fK_f]*D_f⁻¹H_fψ_fP_f)H_p*",
+    "𝒥_p - 𝒥_f(ℳ_ff+J_f)⁻¹ℳ_fp = (ψ_f* - Ω_fP_f)H_p*",
+    "ln det ℳ = ln det ℳ_ff + ln det(ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp)",
+    "[I-H_fψ_fK_f]*ν_f - K_f*ψ_f*L = θ̈_f,  L = a + H_p*θ̈_p",
+    "T_p = H_p(P_f(ψ_f*(H_f*ν_f + L) - L) + z_f),  L = a + H_p*θ̈_p",
+]
+
+
+@pytest.mark.parametrize("text", HYBRID)
+def test_letters_of_hybrid_dynamics(text):
+    model = pc.tree([-1, 0, 0, 1], ["pin", "ball", "slider", "universal"], seed=1)
+    assert pc.check(text, model, states=1, search=False) and prove(text)
+    if "θ" not in text and "T" not in text and "ln" not in text:  # these have no vectors, and ℳ is ℳ_ff
+        assert pc.check(text, model.soa.free(["hinge0"]), states=1, search=False)
+
+
+def test_letters_of_loops():
+    bars = pc.chain(3)
+    bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
+    bars.q = bars.assemble([1.0, -1.4, -1.5], fix="hinge0").q
+    assert pc.check("Qℳ⁻¹Q* = Q[I-HψK]*D⁻¹[I-HψK]Q*", bars, states=1, search=False)
+    assert pc.check("Qℳ⁻¹Q* = Q[I-HψK]*D⁻¹[I-HφK]Q*", bars, states=1, search=False).verdict == "fails"
+    with pytest.raises(ParseError, match="no operator is called 'Q'"):
+        pc.check("Q = Q", pc.chain(3))
