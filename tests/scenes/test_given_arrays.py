@@ -186,6 +186,7 @@ def test_models_hinges_and_bodies():
             array[...] = 0.0
 
 
+@pytest.mark.peers
 def test_what_files_say_beside_a_model(tmp_path):
     path = tmp_path / "m.xml"
     path.write_text(
