@@ -313,6 +313,31 @@ S ConstrainedWorkspace<S>::energy_of_hinges(const S* x) {
 }
 
 template <class S>
+void ConstrainedWorkspace<S>::find_bias(const Asked& asked) {
+  using std::abs;
+  const int nv = model_->nv, rows = loops_->rows;
+  c_.assign(rows, S(0)), bias_.assign(rows, S(0));
+  loop_bias(*model_, *loops_, asked.q, asked.v, buffers_, c_.data());
+  S fastest = S(0);
+  for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
+  for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
+  if constexpr (!is_recorded<S>)  // what velocities that stopped ask of rows is rounding
+    for (int r = 0; r < rows; ++r) bias_[r] += S(stopped * stopped) * size_of(r) / certified();
+  if (asked.gains) {
+    target_.assign(rows, S(0));
+    loop_residuals(*model_, *loops_, asked.q, buffers_, target_.data());
+    for (int r = 0; r < rows; ++r) {
+      const Baumgarte& of = (*asked.gains)[r];
+      const S drawn = S(of.beta) * S(of.beta) * target_[r];
+      c_[r] += S(2 * of.alpha) * rows_.product(r, asked.v) + drawn;
+      bias_[r] += S(2 * of.alpha) * rows_.product_size(r, asked.v) + abs(drawn);
+    }
+  }
+  if (asked.driven)
+    for (int r = 0; r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
+}
+
+template <class S>
 void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoops>& loops, const Asked& asked) {
   using std::abs;
   set_loops(loops);
@@ -328,26 +353,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
   for (int i = 0; i < nv; ++i) x_[i] -= points_.absorbed[i];
   rows_.find(*model_, *loops, asked.q, buffers_);
   if (std::any_of(x_.begin(), x_.end(), [](const S& x) { return !is_finite(x); })) return;  // callers say what left its range
-  // c, and what it is the sum of
-  c_.assign(rows, S(0)), bias_.assign(rows, S(0));
-  loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());
-  S fastest = S(0);
-  for (int i = 0; i < nv; ++i) fastest = maximum(fastest, S(abs(asked.v[i])));
-  for (int r = 0; r < rows; ++r) bias_[r] = abs(c_[r]) + fastest * rows_.product_size(r, asked.v);
-  if constexpr (!is_recorded<S>)  // what velocities that stopped ask of rows is rounding
-    for (int r = 0; r < rows; ++r) bias_[r] += S(stopped * stopped) * size_of(r) / certified();
-  if (asked.gains) {
-    target_.assign(rows, S(0));
-    loop_residuals(*model_, *loops, asked.q, buffers_, target_.data());
-    for (int r = 0; r < rows; ++r) {
-      const Baumgarte& of = (*asked.gains)[r];
-      const S drawn = S(of.beta) * S(of.beta) * target_[r];
-      c_[r] += S(2 * of.alpha) * rows_.product(r, asked.v) + drawn;
-      bias_[r] += S(2 * of.alpha) * rows_.product_size(r, asked.v) + abs(drawn);
-    }
-  }
-  if (asked.driven)
-    for (int r = 0; r < rows; ++r) c_[r] -= asked.driven[r], bias_[r] += abs(asked.driven[r]);
+  find_bias(asked);
   factor(c_.data());
   // The same state in the next wider scalar, where what rounding hid of the rows is seen, or refused.
   const bool settling = settles_rows_of<S>(*loops);

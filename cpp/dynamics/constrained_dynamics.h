@@ -79,6 +79,7 @@ class ConstrainedWorkspace {
 
  private:
   void set_loops(const std::shared_ptr<const ResolvedLoops>& loops);
+  void find_bias(const Asked& asked);         // Q̇θ̇ with gains and what drives the rows, and the size of what it is the sum of
   void factor(const S* bias);                 // the rows' columns, of the tree's factors; of accelerations with Q̇θ̇, else null
   void meet(const S* target, bool first);     // x += (ℳ + J)⁻¹Q*λ such that Q x + target = 0, and adds λ
   void correct(const Asked& asked, const Applied<S>& applied);

@@ -189,6 +189,37 @@ void Sensitivities<S>::mass_matrix(const S* q, S* out) {
   }
 }
 
+// Of [X, Y] paired with Z, along coordinates a, b and c of one ball or free subhinge, in Koszul's formula.
+template <class S>
+void add_bracket(S* out, size_t n, int a, int b, int c, const S& pairing) {
+  const S g = pairing / S(2);
+  out[(size_t(c) * n + b) * n + a] += g;  // [X, Y], Z with X = a, Y = b
+  out[(size_t(b) * n + c) * n + a] -= g;  // [X, Z], Y with X = a, Z = b
+  out[(size_t(b) * n + a) * n + c] -= g;  // [Y, Z], X with Y = a, Z = b
+}
+
+// Rotors bring the same brackets, paired by J, which is of the subhinge's own coordinates alone.
+template <class S>
+void Sensitivities<S>::add_brackets_of_rotors(S* out) const {
+  const CompiledModel<S>& m = *model_;
+  for (int a = 0; a < m.nv; ++a)
+    with_subhinge(m.subhinges[frame_.subhinge_of[a]].kind, [&](auto row) {
+      if constexpr (row.nv > 1) {
+        int first = a;
+        while (first > 0 && frame_.subhinge_of[first - 1] == frame_.subhinge_of[a]) --first;
+        S one[row.nv], other[row.nv], bracket[row.nv];
+        std::fill_n(one, row.nv, S(0)), std::fill_n(other, row.nv, S(0));
+        one[a - first] = S(1);
+        for (int b = 0; b < row.nv; ++b) {
+          other[b] = S(1);
+          row.bracket(static_cast<const S*>(one), static_cast<const S*>(other), bracket);
+          other[b] = S(0);
+          for (int c = 0; c < row.nv; ++c) add_bracket(out, m.nv, a, first + b, first + c, S(m.rotor_inertia[first + c] * bracket[c]));
+        }
+      }
+    });
+}
+
 template <class S>
 void Sensitivities<S>::christoffel(const S* q, S* out) {
   const CompiledModel<S>& m = *model_;
@@ -204,12 +235,7 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
       for (int k = 0; k < N; ++k) out[(size_t(i) * n + j) * n + k] = (D(i, j, k) + D(i, k, j) - D(j, k, i)) / S(2);
     }
   // Brackets: [∂_a, ∂_b] is ∂ along S_a × S_b within one ball or free subhinge, whose twists span it; its momentum pairs with S_c.
-  const auto add = [&](int a, int b, int c, const S& pairing) {  // of c on one path with a
-    const S g = pairing / S(2);
-    out[(size_t(c) * n + b) * n + a] += g;  // [X, Y], Z with X = a, Y = b
-    out[(size_t(b) * n + c) * n + a] -= g;  // [X, Z], Y with X = a, Z = b
-    out[(size_t(b) * n + a) * n + c] -= g;  // [Y, Z], X with Y = a, Z = b
-  };
+  const auto add = [&](int a, int b, int c, const S& pairing) { add_bracket(out, n, a, b, c, pairing); };  // of c on one path with a
   std::vector<Vector6<S>>& carried = alpha_;  // the bracket about the origins of the bodies outboard
   for (int a = 0; a < N; ++a)
     for (int b = 0; b < N; ++b) {
@@ -242,23 +268,7 @@ void Sensitivities<S>::christoffel(const S* q, S* out) {
           for (size_t row = 0; row < n * n; ++row) out[row * n + k] = S(0);
     }
   }
-  // Rotors: the same brackets, paired by J, which is of the subhinge's own coordinates alone.
-  for (int a = 0; a < N && m.has_rotor_inertia; ++a)
-    with_subhinge(m.subhinges[frame_.subhinge_of[a]].kind, [&](auto row) {
-      if constexpr (row.nv > 1) {
-        int first = a;
-        while (first > 0 && frame_.subhinge_of[first - 1] == frame_.subhinge_of[a]) --first;
-        S one[row.nv], other[row.nv], bracket[row.nv];
-        std::fill_n(one, row.nv, S(0)), std::fill_n(other, row.nv, S(0));
-        one[a - first] = S(1);
-        for (int b = 0; b < row.nv; ++b) {
-          other[b] = S(1);
-          row.bracket(static_cast<const S*>(one), static_cast<const S*>(other), bracket);
-          other[b] = S(0);
-          for (int c = 0; c < row.nv; ++c) add(a, first + b, first + c, S(m.rotor_inertia[first + c] * bracket[c]));
-        }
-      }
-    });
+  if (m.has_rotor_inertia) add_brackets_of_rotors(out);
 }
 
 template <class S>

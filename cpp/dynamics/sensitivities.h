@@ -54,6 +54,7 @@ class Sensitivities {
   void twists_about(int body);  // of the coordinates on its path, about its origin: outboard_
   void differentiate_forces(S* dq, S* dv, int stride);  // ∂T/∂q, ∂T/∂v in the frame that was filled
   void differentiate_rotors(const S* v, S* dv, int stride) const;  // += ∂c/∂v of the rotors' v ×* (J v)
+  void add_brackets_of_rotors(S* out) const;  // to Γ
   void differentiate_absorbed(S* dv);
   bool differentiate_sweep(const double* q, const double* v, const double* tau, const Solving& how, S* dq, S* dv, S* dtau, const Applied<double>* applied);
   Pose<S> node_in_axes(const Node& node) const;
