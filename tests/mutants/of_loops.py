@@ -18,7 +18,7 @@ CHANGES = {
         ),
         (
             "residuals of loops are measured by what is left",
-            "size = maximum(size, S(sizes_[row] / unit(row)));",
+            "  size = maximum(size, S(sizes_[row] / unit(row)));",
             ";",
             STATEMENT,
         ),

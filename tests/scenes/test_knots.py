@@ -58,7 +58,10 @@ def test_a_servo_whose_target_goes_out_and_back(integrator):
     tight = dict(rtol=1e-10, atol=1e-13)
     run = scene.simulate(6.0, [0.0], [0.0], **options(integrator), **tight)
     slope = np.diff(target) / np.diff(times)
-    at = lambda i, t: target[i] + slope[i] * (t - times[i])  # noqa: E731
+
+    def at(i, t):
+        return target[i] + slope[i] * (t - times[i])
+
     exact = pieces(lambda i, t, y: [y[1], 40 * (at(i, t) - y[0]) + 3 * (slope[i] - y[1])], [0.0, 0.0], [0, 5, 5.3, 5.7, 6])
     assert abs(exact[0]) > 1e-2 and np.abs([run.q[-1, 0] - exact[0], run.v[-1, 0] - exact[1]]).max() < 1e-8
     if integrator == "dopri5":

@@ -18,9 +18,15 @@ def options(integrator):
 
 def bounced(stiffness, dissipation, at, T):
     """q and v of v(0) = 1 under an acceleration of -2 and the law of stops, from one change of it to the next."""
-    law = lambda t, y: [y[1], -2 - (stiffness * (y[0] - at) * max(0, 1 + dissipation * y[1]) if y[0] > at else 0)]  # noqa: E731
+
+    def law(t, y):
+        return [y[1], -2 - (stiffness * (y[0] - at) * max(0, 1 + dissipation * y[1]) if y[0] > at else 0)]
+
     first = (1 - np.sqrt(1 - 4 * at)) / 2  # of q = t - t²
-    leaves = lambda t, y: y[0] - at if t > first + 1e-9 else 1.0  # noqa: E731
+
+    def leaves(t, y):
+        return y[0] - at if t > first + 1e-9 else 1.0
+
     leaves.terminal, leaves.direction = True, -1
     inside = solve_ivp(law, (first, T), [at, 1 - 2 * first], events=leaves, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-3)
     t, (q, v) = inside.t[-1], inside.y[:, -1]
@@ -55,7 +61,10 @@ def test_events(integrator, depth):
     """Both zeros, each to rounding of the parabola's slope there, and of each direction one."""
     level = 0.25 - depth
     ball = pc.Scene(slider()).add(E.Gravity((-2.0, 0, 0)))
-    g = lambda t, state: state.q[0] - level  # noqa: E731
+
+    def g(t, state):
+        return state.q[0] - level
+
     events = [pc.Event(g, 0, name="both"), pc.Event(g, 1, name="rising"), pc.Event(g, -1, name="falling")]
     run = ball.simulate(2.0, [0.0], [1.0], events=events, **options(integrator))
     exact = 0.5 + np.array([-1, 1]) * np.sqrt(depth)
