@@ -140,7 +140,8 @@ void ConstrainedWorkspace<S>::bring(const std::shared_ptr<const ResolvedLoops>& 
   if constexpr (settles<S>) if (settles_rows_of<S>(*loops)) {  // what rounding hid: the wider scalar takes it the rest of the way, from what is there already
     sizes_.assign(rows, S(0)), bias_.assign(rows, S(0));
     for (int r = 0; r < rows; ++r) bias_[r] = abs(target_[r]) + S(stopped) * size_of(r) / certified(), sizes_[r] = rows_.product_size(r, v) + bias_[r];
-    if (largest(gone_) > sqrt(epsilon<S>()) || off_in_own_units(rows_, asking_, x_.data(), target_.data(), bias_.data(), sizes_.data(), certified(), off_) > S(0)) {
+    const S left = largest(gone_);  // further off than steps reach is refused
+    if (left <= S(reach_of_steps) && (left > sqrt(epsilon<S>()) || off_in_own_units(rows_, asking_, x_.data(), target_.data(), bias_.data(), sizes_.data(), certified(), off_) > S(0))) {
       using T = Wider<S>;
       std::vector<T> at(q, q + model_->nq), motion(x_.begin(), x_.end()), driven;
       if (rates) driven.assign(rates, rates + rows);

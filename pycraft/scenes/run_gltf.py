@@ -25,8 +25,9 @@ def checked_gltf(path: Any) -> Path:
 
 def to_gltf(run: Any, output: Any, fps: Any, speed: Any) -> Path:
     """`Run.to_gltf`."""
-    target, pygltflib = checked_gltf(output), _pygltflib()
-    document = _Document(pygltflib, AnimatedBodies(run, fps, speed)).made
+    target, seen = writable_target(output, ENDINGS, "glTF"), AnimatedBodies(run, fps, speed)
+    pygltflib = _pygltflib()
+    document = _Document(pygltflib, seen).made
     if target.suffix == ".gltf":
         document.convert_buffers(pygltflib.BufferFormat.DATAURI)
         target.write_text(document.to_json(), encoding="utf-8")

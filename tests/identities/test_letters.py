@@ -78,6 +78,7 @@ def test_what_is_false_fails(text):
 def test_values_are_those_of_the_direct_calls():
     """An oracle beside the algebra: inverse dynamics, forward dynamics and bias forces of the recursions."""
     arm = pc.tree([-1, 0, 1, 1], ["pin", "ball", "universal", "free"], seed=3, rotor_inertia=True)
+    arm.hinges["hinge1"].rotor_inertia, arm.hinges["hinge3"].rotor_inertia = [0.3] * 3, [0.2] * 3 + [0.0] * 3  # no v ×* (J v)
     state = arm.random_state(seed=1)
     arm.q, arm.v = state.q, state.v
     vdot = np.random.default_rng(0).normal(size=arm.nv)

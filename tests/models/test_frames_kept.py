@@ -182,7 +182,7 @@ def test_what_is_kept_is_what_is_computed_anew():
             model.frame("a").placement = X
         else:
             hinge = model.hinges[str(rng.choice(list(model.hinges)))]
-            X = hinge.placement
+            X = hinge.placement.copy()
             X[:3, 3] += 0.01
             hinge.placement = X
 

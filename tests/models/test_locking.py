@@ -104,7 +104,7 @@ def test_a_placement_that_is_set_meanwhile_moves_the_hinge():
     arm = pc.chain(3, seed=1)
     arm.q = [0.3, -0.7, 0.4]
     arm.lock("hinge1")
-    moved = arm.hinges["hinge1"].placement
+    moved = arm.hinges["hinge1"].placement.copy()
     moved[:3, 3] += (0.1, 0.2, 0.0)
     arm.hinges["hinge1"].placement = moved
     pose = arm.pose("body2")

@@ -80,7 +80,7 @@ def test_a_moving_base_follows_a_placement_inboard_of_it():
     mb = robot()
     hand = mb.subgraph(root="body5", base="moving")
     before = np.array(hand.q)
-    pose = mb.hinges["hinge0"].placement
+    pose = mb.hinges["hinge0"].placement.copy()
     pose[:3, 3] += (1, 2, 3)
     mb.hinges["hinge0"].placement = pose
     assert np.allclose(hand.q[:7], hand.q_of()[:7], rtol=0, atol=1e-14) and not np.array_equal(hand.q, before)

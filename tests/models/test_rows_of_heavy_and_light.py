@@ -55,7 +55,7 @@ def allowed(model, q, v, vdot, free):
 @pytest.mark.parametrize("seed", MISSED)
 @pytest.mark.parametrize("how", [{}, {"form": "ud"}, {"refine": "auto"}, {"form": "square-root"}])
 def test_rows_are_kept_in_their_own_units(seed, how):
-    """Whatever the form."""
+    """Whatever the form. Where no row holds, v̇ is certified to √ε of what cancels in it."""
     model, q, v, tau = heavy(seed)
     right = model.constrained_dynamics(q, v, tau, precision="quad")
     free = np.abs(model.forward_dynamics(q, v, tau, precision="quad")).max()
@@ -64,7 +64,7 @@ def test_rows_are_kept_in_their_own_units(seed, how):
     except pc.SingularHingeError:
         pytest.skip("the tree by itself feels too little inertia for this form")
     assert (missed(model, q, v, found.vdot) <= allowed(model, q, v, found.vdot, free)).all()
-    np.testing.assert_allclose(found.vdot, right.vdot, rtol=0, atol=1e-4 * np.abs(right.vdot).max() + 1e-10 * free)
+    np.testing.assert_allclose(found.vdot, right.vdot, rtol=0, atol=1e-4 * np.abs(right.vdot).max() + np.sqrt(np.finfo(float).eps) * free)
 
 
 def test_a_dropped_row_is_found_again():

@@ -149,10 +149,27 @@ def newton_euler(description, q, v, vdot):
     return tau + rotors * vdot, mass_matrix + np.diag(rotors)
 
 
+def gyroscopic(description, v):
+    """Of rotors on balls and free hinges, by Euler's equations and Newton's in turning axes: (ω × Jω + u × Ju; ω × Ju)."""
+    forces, at = np.zeros(len(v)), 0
+    for b in description["bodies"]:
+        rotors, first = np.asarray(b["hinge"]["rotor_inertia"]), at
+        for subhinge in b["hinge"]["subhinges"]:
+            size = {"ball": 3, "free": 6}.get(subhinge["kind"], 1)
+            x, p = v[at : at + size], rotors[at - first : at - first + size] * v[at : at + size]
+            if size == 3:
+                forces[at : at + 3] = np.cross(x, p)
+            if size == 6:
+                forces[at : at + 6] = [*(np.cross(x[:3], p[:3]) + np.cross(x[3:], p[3:])), *np.cross(x[:3], p[3:])]
+            at += size
+    return forces
+
+
 @each_model
 def test_newton_and_euler_in_the_world(description):
     q, v, vdot = state(description)
     tau, mass_matrix = newton_euler(description, q, v, vdot)
+    tau += gyroscopic(description, v)
     agree(reference.mass_matrix(description, q), mass_matrix)
     agree(reference.inverse_dynamics(description, q, v, vdot), tau, DIFFERENCE)
     agree(reference.kinetic_energy(description, q, v), 0.5 * v @ mass_matrix @ v)
@@ -179,7 +196,7 @@ def test_coriolis_matrix(description):
     agree(J_dot, rate_along(lambda x: (lambda s: s.phi.T @ s.H.T)(reference.operators(description, x)), description, q, v))
     C = o.H @ o.phi @ (o.M @ J_dot + o.momentum_cross @ J)
     agree(rate_along(lambda x: reference.mass_matrix(description, x), description, q, v), C + C.T)
-    agree(C @ v, reference.bias_forces(description, q, v) - reference.bias_forces(description, q, 0 * v))
+    agree(C @ v + gyroscopic(description, v), reference.bias_forces(description, q, v) - reference.bias_forces(description, q, 0 * v))
     agree(o.momentum_cross @ o.V, o.b)
     agree(o.V_bar, -o.V_tilde.T)
     for s in o.states:  # f = ṗ about a moving origin: (ω × n + v × f; ω × f)

@@ -134,7 +134,7 @@ def test_what_drives_instead_of_braking_is_warned_of(arm, effect):
         (dict(rtol=0, atol=1e-20), "are below what the precision holds"),
         (dict(t_eval=[0.5, 0.2]), r"t_eval: entry 1 is 0.2 s after 0.5 s; times rise"),
         (dict(t_eval=[0.5, 2.0]), "t_eval goes from 0.5 to 2 s; the run goes from 0 to T = 1 s"),
-        (dict(t_eval=[]), "t_eval: a rising list"),
+        (dict(t_eval=[]), r"t_eval: times \(K,\) in seconds, one at least"),
         (dict(normalise="often"), "normalise='often': there are 'never' and 'each step'"),
     ],
 )

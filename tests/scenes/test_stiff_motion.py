@@ -266,9 +266,9 @@ def test_an_explicit_step_beyond_its_stability(effect):
 
 
 def test_a_state_that_is_not_finite_has_no_sign():
-    scene = pc.Scene(slider()).add(E.Limits(1e12, 0.0, -0.5, 0.5))
+    scene = pc.Scene(slider()).add(E.Spring(1e12))
     with pytest.raises(pc.EvaluationError, match=r"is (nan|inf|-inf); take smaller steps"):
-        scene.simulate(100.0, [0.0], [1.0], integrator="rk4", step=0.05, **QUIET)
+        scene.simulate(100.0, [1.0], [1.0], integrator="rk4", step=0.05, **QUIET)
 
 
 @pytest.mark.parametrize("integrator", ["dopri5", "dop853", "rosenbrock4"])

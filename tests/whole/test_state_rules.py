@@ -7,6 +7,7 @@ import pytest
 
 import pycraft as pc
 from pycraft.dynamics.constrained import ConstrainedDynamics, ConstrainedVelocities
+from pycraft.dynamics.inverse_on_loops import ConstrainedForces
 from pycraft.dynamics.quadratic import QuadraticModel
 from pycraft.dynamics.task_space import TaskSpace
 from pycraft.linear.linear_model import LinearModel
@@ -55,6 +56,8 @@ def leaves(x):
         return [*leaves(x.linear), *x.tensors()]
     if isinstance(x, (ConstrainedDynamics, ConstrainedVelocities)):
         return [x.vdot if isinstance(x, ConstrainedDynamics) else x.v, x.multipliers]
+    if isinstance(x, ConstrainedForces):
+        return [x.tau, x.multipliers]
     if isinstance(x, Shares):
         return [x.values]
     if isinstance(x, LimitDistances):
