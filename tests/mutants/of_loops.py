@@ -6,7 +6,7 @@ CHANGES = {
     "cpp/dynamics/constrained_dynamics.cpp": [
         (
             "rows of loops without what velocities ask",
-            "loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());",
+            "loop_bias(*model_, *loops_, asked.q, asked.v, buffers_, c_.data());",
             ";",
             STATEMENT,
         ),
@@ -96,7 +96,7 @@ CHANGES = {
     "cpp/dynamics/embedded_dynamics.cpp": [
         (
             "embedded rows without what velocities ask",
-            "loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());",
+            "loop_bias(*model_, *loops_, asked.q, asked.v, buffers_, c_.data());",
             ";",
             STATEMENT,
         ),

@@ -154,8 +154,8 @@ def gyroscopic(description, v):
     forces, at = np.zeros(len(v)), 0
     for b in description["bodies"]:
         rotors, first = np.asarray(b["hinge"]["rotor_inertia"]), at
-        for subhinge in b["hinge"]["subhinges"]:
-            size = {"ball": 3, "free": 6}.get(subhinge["kind"], 1)
+        for part in b["hinge"]["subhinges"]:
+            size = {"ball": 3, "free": 6}.get(part["kind"], 1)
             x, p = v[at : at + size], rotors[at - first : at - first + size] * v[at : at + size]
             if size == 3:
                 forces[at : at + 3] = np.cross(x, p)
