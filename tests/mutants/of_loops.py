@@ -96,7 +96,7 @@ CHANGES = {
     "cpp/dynamics/embedded_dynamics.cpp": [
         (
             "embedded rows without what velocities ask",
-            "loop_bias(*model_, *loops_, asked.q, asked.v, buffers_, c_.data());",
+            "loop_bias(*model_, *loops, asked.q, asked.v, buffers_, c_.data());",
             ";",
             STATEMENT,
         ),

@@ -36,7 +36,7 @@ CHANGES = {
         ("prescribed coordinates are displaced", "start[:, [j, n + j]] = 0.0", "pass"),
     ],
     "pycraft/scenes/scene_quadratic.py": [
-        ("controllers are asked within a step", "*state, between) for", "*state, False) for"),
+        ("controllers are asked within a step", "*state, between))", "*state, False))"),
         ("pushes move what is prescribed", "given[known_coordinates(one)] = 0.0", "pass"),
     ],
     "pycraft/state.py": [("a run is at t = 0", 'getattr(q, "t", 0.0) if t is None', "0.0 if t is None")],

@@ -23,7 +23,9 @@ template <class S>
 class DormandPrince8 : public Attempts<S> {
  public:
   using State = std::vector<S>;
-  DormandPrince8(ExplicitEquations<S>& equations, const IntegratorOptions& options) : equations_(equations), options_(options), pair_(coefficients()), stages_(pair_.tableau), count_(equations.size() - equations.integrals()) {}
+  DormandPrince8(ExplicitEquations<S>& equations, const IntegratorOptions& options) : equations_(equations), options_(options), pair_(coefficients()), stages_(pair_.tableau), count_(equations.size() - equations.integrals()) {
+    for (State& F : between_) F.resize(equations.size());
+  }
 
   bool attempt(S& t, State& x, S& h) override {
     if (ended_) stages_.k(0).swap(stages_.k(judged));  // the rate at the last step's end
@@ -115,7 +117,6 @@ class DormandPrince8 : public Attempts<S> {
     stages_.up_to(judged + 4);
     equations_.go_through(stages_);
     extended_ = true;
-    for (State& F : between_) F.resize(start_.size());
     const S h = t_to_ - t_from_;
     for (size_t i = 0; i < start_.size(); ++i) {
       const S by = end_[i] - start_[i], first = h * stages_.k(0)[i], last = h * stages_.k(judged)[i];
