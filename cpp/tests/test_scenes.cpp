@@ -150,7 +150,8 @@ BOOST_AUTO_TEST_CASE(steps_allocate_nothing) {
       const std::vector<double> times{0, 0.01 * (1 + twice)};
       counts[twice] = allocations_of([&] { integrate<double>(equations, x, times, {integrator, 1e-6, 1e-6, 1e-3, true}, [](const double&, const std::vector<double>&) {}); });
     }
-    BOOST_TEST(counts[0] == counts[1], integrator_name(integrator));
+    // What is made once, of arrays for a step that the run's end cuts, may differ by a few; ten steps more would be ten at least.
+    BOOST_TEST(std::abs(counts[0] - counts[1]) <= 4, integrator_name(integrator) << ": " << counts[0] << " allocations, in as long again " << counts[1]);
   }
 }
 
