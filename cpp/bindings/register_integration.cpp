@@ -86,7 +86,7 @@ struct Motion {
   std::vector<double> q, v, times, tau, damping;
   IntegratorOptions options;
   Solving how;
-  py::object stiff;                     // is told once that the motion is stiff
+  py::object stiff;                     // called once when the motion becomes stiff
   py::object foreign, right_hand_side;  // a solver from outside of the core, accelerations of a user's own; None: no such
 };
 

@@ -62,7 +62,7 @@ struct Asked {
   const py::object* progress;  // null: not wanted
   const py::object* foreign;   // null: an integrator of the core
   const WrittenCheckpoint* checkpoint;
-  const py::object* stiff = nullptr;   // is told once that the motion is stiff; null: not wanted
+  const py::object* stiff = nullptr;   // called once when the motion becomes stiff; null: not wanted
   StatesTogether* others = nullptr;  // null: a run by itself
 };
 

@@ -72,7 +72,7 @@ inline py::dict as_dict(const Stiffness& s) {
   return d;
 }
 
-// Writes a run down. unit: of works in x. examine: what is stiff at a state, nothing where the steps are not held by it; said: is told of that.
+// Record a run. unit: of works in x. examine: describe what is stiff at a state, empty where it does not hold the steps; said: receives that text.
 template <class S>
 class Recorder : public Watcher<S> {
  public:

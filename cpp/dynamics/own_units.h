@@ -1,6 +1,6 @@
 // Rows of loops certified in their own units, and what is not sure in one scalar settled in the next wider one.
 //
-// Ranks are told in units of energy, in which a row that a light body shares with heavy ones is nearly all the light body's: of two such rows the
+// Ranks are decided in units of energy, in which a row that a light body shares with heavy ones is nearly all the light body's: of two such rows the
 // difference is lost where masses differ by 1/ε, and a row may be missed whole by what is nothing in those units. What the tree alone would do there is
 // no measure of it: accelerations that are asked of 1e-9 kg by itself are of 1e9 m/s².
 #pragma once

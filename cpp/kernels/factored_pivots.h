@@ -46,7 +46,7 @@ template <int K, int n, class S, class T>
   return lever_squared(link, gone) * (plane + leaking * diagonal_of(L, own.row[3 + K]));
 }
 
-// Whether link k leaks, before what hangs on it tells: 1 where one of those is no pin about the same axis, or has a rotor: a share of the hinge's row
+// Whether link k leaks, before its outboard links are seen: 1 where one of those is no pin about the same axis, or has a rotor: a share of the hinge's row
 // is left then, J/D of it, and of heavy columns that is rounding where products are rounded before they are subtracted. Links come from the base
 // outward.
 template <class S, class T>

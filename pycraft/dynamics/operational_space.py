@@ -82,7 +82,7 @@ def _of_frames(
     if result is None:
         by_operators = _operator(model.soa, inverse, names)
         if not kernel:
-            with suppress(_core.SingularOperatorError):  # whichever state it is of is told below
+            with suppress(_core.SingularOperatorError):  # its state is named below
                 return _written(by_operators.at(q, form=form, precision=precision).dense(), out)
 
         def one(state: np.ndarray, told: str = "") -> np.ndarray:

@@ -88,7 +88,7 @@ class Statements:
         raise refusal
 
     def letter(self, name: str, definitions: Sequence[Definition]) -> Any:
-        """What a letter stands for, with these definitions. Raises ParseError."""
+        """Return the meaning of a letter under these definitions. Raises ParseError."""
         return self._with(definitions).operator(name)
 
     def _is_by_block(self, claim: str, own: Iterable[str]) -> bool:

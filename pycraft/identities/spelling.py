@@ -276,7 +276,7 @@ _SUBSCRIPT = r"((?:_(?:plus|\d+|\w))?)"
 
 
 def _apart(found: re.Match[str]) -> str:
-    """A letter and its accents as characters of their own, but for those of the table."""
+    """Split a letter and its accents into characters, except those of the table."""
     letter = found[0]
     return letter if letter in _IN_ASCII else unicodedata.normalize("NFD", letter)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class StandardLetter:
-    """How a letter is shown, what it is in words, and what it stands for: one meaning or several."""
+    """A letter: how it is shown, its name in words, and its meanings, one or several."""
 
     text: str
     meaning: str

@@ -65,7 +65,7 @@ _ALIASES = {
 
 
 def is_known(name: str) -> bool:
-    """Whether a name stands for something without a definition."""
+    """Return whether a name has a meaning without a definition."""
     return name in _NAMES or name in _ALIASES or name in STANDARD or name in ("MM", "I", "N", "vdot")
 
 
@@ -184,7 +184,7 @@ class Vocabulary:
         raise ParseError(self.unknown(name))
 
     def _of_the_book(self) -> dict[str, Any]:
-        """What the caller adds, but for letters of the table with another meaning: of these no letter of the book is made."""
+        """Return what the caller adds, except letters of the table with another meaning: of these no letter of the book is made."""
         own = {name: value for name, value in self._own.items() if name in STANDARD or name not in _NAMES}
         return own | {"MM": self._base["MM"], "I": self._base["I"], "N": self._base["N"]}
 
@@ -195,7 +195,7 @@ class Vocabulary:
         return getattr(self._operators, name)(any_nodes(self._operators))
 
     def _defined(self, name: str, what: str, scope: dict[str, Any]) -> Any:
-        """What a letter stands for, worked out once."""
+        """Return the meaning of a letter, derived once."""
         key = name, what
         if key in self._open:
             raise ParseError(f"{name} is defined by itself")

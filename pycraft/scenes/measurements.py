@@ -153,7 +153,7 @@ class Measurements:
         Inputs are generalized forces beside those of the effects. Exact: effects written in C++ by derivatives of their own arithmetic;
         those in Python by central differences, of which about ten digits are right. At the edge of a stop or of a drive's limit they are
         those of the side that the forces are of. Time itself is held, and so is what sampled controllers hold: their forces are constants
-        here, whatever the states, as between two samples. What is prescribed stays as it is told:
+        here, whatever the states, as between two samples. Prescribed motion goes on as prescribed:
         its rows and columns are zero, and an input there moves nothing. Where effects keep loops the states are displacements and
         velocities on them, in independent coordinates, as of `Multibody.linearize` with loops=True.
 

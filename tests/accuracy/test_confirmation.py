@@ -61,7 +61,7 @@ def test_tables_say_to_how_many_digits_both_methods_agree(scene):
 
 
 def test_a_reference_that_differs_resolves_nothing(scene, monkeypatch):
-    """A second method that is 1e-3 off, whichever of them is wrong: no row below that is resolved, and the table says so."""
+    """A second method that is 1e-3 off, whichever of them is wrong: no row below that is resolved, and the table reports it."""
     by = scene_accuracy._by
 
     def off(*args):

@@ -104,7 +104,7 @@ def test_derivatives(name):
 
 @each_model
 def test_second_derivatives(name):
-    """Of accelerations, contracted, along velocities: v̇ is quadratic in v, and a difference of its gradients exact but for rounding."""
+    """Of accelerations, contracted, along velocities: v̇ is quadratic in v, and a difference of its gradients is exact to rounding."""
     model, q, v, _ = drawn(name, 4)
     nv, costate = model.nv, np.random.default_rng(9).uniform(-1, 1, model.nv)
     tau = np.random.default_rng(8).uniform(-1, 1, nv)
@@ -164,7 +164,7 @@ def test_one_body_on_a_ball():
 
 
 def test_identification_finds_unequal_rotors():
-    """J of a ball, each on its own: the gyroscopic term is in the columns; exact data, exact but for rounding."""
+    """J of a ball, each on its own: the gyroscopic term is in the columns; exact data, exact to rounding."""
     model, rng = ball(), np.random.default_rng(1)
     states = [model.random_state(rng) for _ in range(20)]
     q, v, vdot = np.array([s.q for s in states]), rng.uniform(-2, 2, (20, 3)), rng.uniform(-2, 2, (20, 3))

@@ -71,7 +71,7 @@ def test_keyframes_of_gltf_are_the_run(run, tmp_path):
     assert names == ["two links", "upper", "lower arm"] and document["nodes"][0]["children"] == [1, 2]
     (animation,) = document["animations"]
     turn = matrix(*document["nodes"][0]["rotation"])
-    np.testing.assert_allclose(turn @ [0, 0, 1], [0, 1, 0], atol=1e-15)  # z becomes y, exactly but for the root of a half
+    np.testing.assert_allclose(turn @ [0, 0, 1], [0, 1, 0], atol=1e-15)  # z becomes y, exact except for the root of a half
     seen = {}
     for channel in animation["channels"]:
         sampler = animation["samplers"][channel["sampler"]]

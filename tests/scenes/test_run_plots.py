@@ -54,7 +54,7 @@ def test_what_there_is_not():
 
 
 def test_many_events_are_thinned():
-    """A plot with a line for each of some thousand events is black: those nearest to even times stand for all, and the heading says so."""
+    """A plot with a line for each of some thousand events is black: those nearest to even times stand for all, as the heading reports."""
     from pycraft.scenes.run_plots import MARKS, event_marks
 
     scene = pc.mechanisms.double_pendulum()
@@ -67,7 +67,7 @@ def test_many_events_are_thinned():
     assert len(times) > 2 * MARKS and len(marks) <= MARKS and said == f"vertical lines: {len(marks)} of {len(times)} events"
     assert set(marks) <= set(times) and marks == sorted(marks) and marks[0] == times[0] and marks[-1] == times[-1]
     widest = np.diff(times).max()
-    assert np.diff(marks).max() <= (times[-1] - times[0]) / (MARKS - 1) + widest  # even, but for where no event is
+    assert np.diff(marks).max() <= (times[-1] - times[0]) / (MARKS - 1) + widest  # even, except where no event is
     figure = many.plot("energy")
     assert said in figure.get_suptitle() and sum(len(line.get_xdata()) == 2 for line in figure.axes[0].lines) == len(marks)
     assert said in many.to_html().html and said not in few.to_html().html

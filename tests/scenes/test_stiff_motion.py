@@ -273,7 +273,7 @@ def test_a_state_that_is_not_finite_has_no_sign():
 
 @pytest.mark.parametrize("integrator", ["dopri5", "dop853", "rosenbrock4"])
 def test_a_motion_below_the_tolerance(integrator):
-    """Amplitude 1e-14 m at 1e3 rad/s under atol = 1e-12; as 1e-11 m, or with the atol that is told, it is right."""
+    """Amplitude 1e-14 m at 1e3 rad/s under atol = 1e-12; as 1e-11 m, or with the atol of the warning, it is right."""
     scene, T = pc.Scene(slider()).add(E.Spring(1e6)), 20 * np.pi / 1e3
     with pytest.warns(pc.ModelWarning, match="this motion is smaller than its tolerance: .* atol = 1e-12 .* Take atol = "):
         scene.simulate(T, [1e-14], [0.0], integrator=integrator, **QUIET)

@@ -50,7 +50,7 @@ class Workspace {
     bool worked = false;
     for (const Step& s : plan_->steps) {
       const bool per_column = s.out >= 0 && plan_->registers[s.out].kind == RegisterKind::vector;
-      // a function of a vector, an operand with one in it, and what is made of them, may hang on a named vector
+      // a function of a vector, an operand with one in it, and what is made of them, may depend on a named vector
       if (!values_changed && !per_column && !functions_of_vectors_) continue;
       if (worked) check_interrupt();
       step(s, values, columns, counts);

@@ -85,7 +85,7 @@ function buildTree() {
   });
 }
 
-// -1 below its lower limit, 1 above its upper one, 0 within; what is at a limit but for rounding is within.
+// -1 below its lower limit, 1 above its upper one, 0 within; what is at a limit to rounding is within.
 function beyondLimit({ lower, upper }, u) {
   const slack = (limit) => 1e-9 * Math.max(1, Math.abs(limit));
   return lower !== null && u < lower - slack(lower) ? -1 : upper !== null && u > upper + slack(upper) ? 1 : 0;
