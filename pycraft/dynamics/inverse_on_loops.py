@@ -220,14 +220,12 @@ class ConstrainedInverseCalls:
         ('hinge0', 'hinge1', 'hinge2')
         """
         model: Any = self
-        q, v, vdot, batch = _motion(model, q, v, vdot)
-        names, in_world, numbers = pushed(wrenches, wrench_axes)
-        check_on_loops(model, q, v, vdot)
-        f, _, needed, _ = model._interbody().after(q, v, vdot, names, in_world, numbers, False, "double")
+        (q, v, vdot), _, pushes = _asked(model, q, v, vdot, wrenches, wrench_axes)
+        f, _, needed, _ = model._interbody().after(q, v, vdot, *pushes, False, "double")
         driven = actuated_coordinates(model, actuated)
         found = shared_out(self.loops.jacobian(q), needed, driven)
         forces = end_forces(model, np.broadcast_to(q, (*needed.shape[:-1], q.shape[-1])), found.multipliers)
-        unattained = beyond(model, found.residual, needed, f, numbers, tolerance)
+        unattained = beyond(model, found.residual, needed, f, pushes[2], tolerance)
         _, multipliers, own, of_loops, rank = by_loop(self.loops, found.tau, found.multipliers, forces, found.rank)
         return ConstrainedForces(found.tau, multipliers, own, of_loops, found.residual, unattained, rank, found.driven)
 
@@ -252,13 +250,11 @@ class ConstrainedInverseCalls:
         True
         """
         model: Any = self
-        q, v, vdot, batch = _motion(model, q, v, vdot)
-        names, in_world, numbers = pushed(wrenches, wrench_axes)
-        check_on_loops(model, q, v, vdot)
+        (q, v, vdot), batch, pushes = _asked(model, q, v, vdot, wrenches, wrench_axes)
         driven = actuated_coordinates(model, actuated)
-        needed = model._interbody().after(q, v, vdot, names, in_world, numbers, False, "double")[2]
-        if names:
-            along = model._interbody().derivatives(q, v, vdot, names, in_world, numbers, False)[1]
+        needed = model._interbody().after(q, v, vdot, *pushes, False, "double")[2]
+        if pushes[0]:
+            along = model._interbody().derivatives(q, v, vdot, *pushes, False)[1]
         else:
             along = model.inverse_dynamics_derivatives(q, v, vdot)
         Q = self.loops.jacobian(q)
@@ -286,12 +282,17 @@ def beyond(model: Any, left: np.ndarray, needed: np.ndarray, f: np.ndarray, push
     return tuple(model.coordinate_names[j] for j in np.flatnonzero(over))
 
 
-def _motion(model: Any, q: Any, v: Any, vdot: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, ...]]:
+def _asked(
+    model: Any, q: Any, v: Any, vdot: Any, wrenches: Any, wrench_axes: Any
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], tuple[int, ...], tuple[Any, Any, np.ndarray]]:  # fmt: skip
+    """A motion on the loops, checked, the batch's shape, and what pushes: nodes, whether in world axes, wrenches."""
     q, v = at_state(model, q, v)
     vdot = np.zeros(model.nv) if vdot is None else vdot
     q, v, vdot = (np.asarray(_core.real_array(x, name), float) for name, x in (("q", q), ("v", v), ("vdot", vdot)))
-    model.inverse_dynamics(q, v, vdot)  # which says what of them does not fit
-    return q, v, vdot, np.broadcast_shapes(q.shape[:-1], v.shape[:-1], vdot.shape[:-1])
+    model.inverse_dynamics(q, v, vdot)  # refuses what does not fit
+    pushes = pushed(wrenches, wrench_axes)
+    check_on_loops(model, q, v, vdot)
+    return (q, v, vdot), np.broadcast_shapes(q.shape[:-1], v.shape[:-1], vdot.shape[:-1]), pushes
 
 
 def _derivatives(
