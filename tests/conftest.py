@@ -83,7 +83,6 @@ SLOW = {
     "test_loops": lambda item: item.name.startswith("test_rows_of_hinges[1-"),
     "test_speed": lambda item: item.originalname == "test_a_plot_is_drawn",
     "test_judge": lambda item: item.name == "test_hard_models_are_decided[heavy_tip]",
-    "test_embedded_motion": lambda item: item.originalname == "test_choices_that_degrade_are_left",
     "test_embedded": lambda item: item.originalname == "test_theorems" and "four-bar" not in item.name,
     "test_steps_on_loops": lambda item: (
         item.originalname == "test_flat_states_are_passed_with_all_digits" and item.callspec.params["windows"] == 5

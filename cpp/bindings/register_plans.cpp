@@ -3,10 +3,12 @@
 #include <cstdint>
 
 #include "algebra/engine/packs.h"
+#include "algebra/engine/written_plan.h"
 #include "algebra/language/values.h"
 #include "algebra/planning/explain.h"
 #include "algebra/planning/realization.h"
 #include "bindings/bindings.h"
+#include "bindings/tapes.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
@@ -169,6 +171,13 @@ py::object numbers_of(const Plan& p, size_t context, const std::string& name, co
   return blocks;
 }
 
+py::tuple plain_plan(const WrittenPlan& made) {
+  static const char* reads[] = {"q", "v", "x", "vector"};
+  py::list arrays;
+  for (const WrittenPlan::Array& a : made.arrays) arrays.append(py::make_tuple(reads[static_cast<int>(a.what)], a.name, a.width));
+  return py::make_tuple(plain_tape(made.tape), arrays, made.rows, made.columns);
+}
+
 }  // namespace
 
 void register_plans(py::module_& m) {
@@ -206,6 +215,7 @@ void register_plans(py::module_& m) {
         return "<passes: " + std::to_string(c.kernels) + " kernels, " + std::to_string(c.gathers) + " gathers, " + std::to_string(c.scatters) +
                " scatters, " + std::to_string(c.eliminations) + " eliminations, " + std::to_string(c.dense) + " dense>";
       });
+  m.def("scalar_tape", [](const Scalar& s, size_t most) { return plain_plan(written(s, most)); }, py::arg("scalar"), py::arg("most"), "As Plan.tape, of a scalar.");
   auto plan = declared<py::class_<ExecutionPool, std::shared_ptr<ExecutionPool>>>(m, "Plan");
   unpicklable(plan)
       .def("__str__",
@@ -221,6 +231,9 @@ void register_plans(py::module_& m) {
       .def_property_readonly("notes", [](const ExecutionPool& p) { return p.plan().notes; }, "Theorems used, and the reason of a dense step.")
       .def_property_readonly("passes", &ExecutionPool::last_counts, "Counters of the last run.")
       .def_property_readonly("run_notes", &ExecutionPool::run_notes)
+      .def("tape", [](const std::shared_ptr<ExecutionPool>& p, size_t most) { return plain_plan(written({p, &p->plan()}, most)); }, py::arg("most"),
+           "What the plan does, operation by operation, at states that are decided as the one that it is bound to, a batch of one (tapes.h); the arrays\n"
+           "that it reads, each (\"q\", \"v\", \"x\" or \"vector\", name, width), by number; rows and columns of the result.")
       .def_property_readonly("program", [](const ExecutionPool& p) { return plan_as_data(p.plan()); },
                              "The plan as plain data: contexts, registers and steps in dictionaries; pycraft.recursions writes them out.")
       .def("numbers", [](const ExecutionPool& p, size_t context, const std::string& name, const py::tuple& arguments, int state) {

@@ -207,6 +207,11 @@ void register_sources(py::module_& m) {
         const auto* grouped = dynamic_cast<const GroupedOperators*>(&s);
         return grouped ? grouped->base()->structure().coordinate_names : s.structure().coordinate_names;
       })
+      .def_property_readonly("model", [](const std::shared_ptr<SkoSource>& s) -> py::object {
+        const auto* const pairs = dynamic_cast<const AggregatedTree*>(s.get());
+        const auto of = mechanics_of(pairs ? std::const_pointer_cast<SkoSource>(pairs->base().shared_from_this()) : s);
+        return of ? py::cast(of->model()) : py::object(py::none());
+      }, "The multibody model whose operators these are; None for a tree of given matrices.")
       .def_property_readonly("derived_from", [](const SkoSource& s) -> py::object {
         const auto* derived = dynamic_cast<const DerivedOperators*>(&s);
         if (derived == nullptr) return py::none();
@@ -238,15 +243,12 @@ void register_sources(py::module_& m) {
       })
       .def("check_current", &SkoSource::check_current);
   py::class_<MultibodyOperators, SkoSource, std::shared_ptr<MultibodyOperators>>(m, "MultibodyOperators", "The operators' source of a multibody model.")
-      .def_property_readonly("model", [](const MultibodyOperators& s) { return s.model(); })
       .def("__reduce__", [](const MultibodyOperators& s) -> py::tuple {
         s.check_current();  // else its copy would be of the model as it is now
         return py::make_tuple(py::module_::import("pycraft._core").attr("operators_of"), py::make_tuple(py::cast(s.model())));
       });
-  py::class_<GroupedOperators, SkoSource, std::shared_ptr<GroupedOperators>>(m, "GroupedOperators", "The source of a multibody model's operators with its bodies in groups.")
-      .def_property_readonly("model", [](const GroupedOperators& s) { return s.base()->model(); });
+  py::class_<GroupedOperators, SkoSource, std::shared_ptr<GroupedOperators>>(m, "GroupedOperators", "The source of a multibody model's operators with its bodies in groups.");
   py::class_<EmbeddedOperators, SkoSource, std::shared_ptr<EmbeddedOperators>>(m, "EmbeddedOperators", "The source of a multibody model's operators with its loops embedded.")
-      .def_property_readonly("model", [](const EmbeddedOperators& s) { return s.base()->model(); })
       .def_property_readonly("grouped", [](const EmbeddedOperators& s) { return s.grouped(); }, "The same groups of bodies, nothing embedded.")
       .def_property_readonly("independent", &EmbeddedOperators::independent, "The tree's coordinate of each of Θ.")
       .def_property_readonly("dependent", [](const EmbeddedOperators& s) {
@@ -260,6 +262,10 @@ void register_sources(py::module_& m) {
         return all;
       }, "Of each set: the rows of loops that these are solved from.");
   m.def("operators_of", &operators_of, py::arg("model"));
+  m.def("unbound_sources", [](const std::vector<Expression>& operands) {
+    bool anything = false;
+    return unbound_sources(operands, anything);
+  }, py::arg("operands"), "The sources whose state `at` would bind.");
   m.def("_grouped", &grouped_operators, py::arg("base"), py::arg("groups"));
   m.def("_some_coordinates", [](const std::shared_ptr<SkoSource>& base, const std::vector<bool>& kept) -> std::shared_ptr<SkoSource> {
     const auto robot = std::dynamic_pointer_cast<MultibodyOperators>(base);

@@ -6,18 +6,17 @@
 
 namespace pycraft {
 
-// What every operation does, inputs by the name of their array; the three that it takes; its number; the operation of every result; guards, each a
-// truth and whether it holds.
+// What every operation does; the three that it takes, of an input the entry and the number of its array; its number; the operation of every
+// result; guards, each a truth and whether it holds.
 inline py::tuple plain_tape(const kernels::Tape& tape) {
   const auto n = static_cast<py::ssize_t>(tape.operations.size());
   py::array_t<int> taken({n, py::ssize_t(3)});
   py::array_t<double> number(n);
   py::list what, guards, results;
-  const py::str arrays[] = {"q", "v", "u"};
   const std::vector<py::str> names(std::begin(kernels::names_of_operations), std::end(kernels::names_of_operations));
   for (py::ssize_t i = 0; i < n; ++i) {
     const kernels::Operation& o = tape.operations[i];
-    what.append(o.does == kernels::Does::input ? arrays[o.second] : names[static_cast<size_t>(o.does)]);
+    what.append(names[static_cast<size_t>(o.does)]);
     taken.mutable_at(i, 0) = o.first, taken.mutable_at(i, 1) = o.second, taken.mutable_at(i, 2) = o.third, number.mutable_at(i) = o.number;
   }
   for (const kernels::TapedResult& r : tape.results) results.append(r.from);

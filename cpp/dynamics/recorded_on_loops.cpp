@@ -6,29 +6,13 @@
 #include "dynamics/constrained_dynamics.h"
 #include "model/recorded_model.h"
 #include "numerics/recorded.h"
+#include "recursions/loop_pairs.h"
 #include "runtime/errors.h"
 
 namespace pycraft {
 
-namespace {
-
-// Loops whose rows decide by more than a comparison.
-void check_rows(const ResolvedLoops& loops) {
-  for (const ResolvedLoop& one : loops.loops) {
-    const Loop& loop = *one.loop;
-    const char* const why = loop.coupling.function ? "it is a function of Python's"
-                            : !loop.is_coupling() && loop.pair.kind == PairKind::screw ? "a screw counts its turns"
-                            : !loop.is_coupling() && loop.pair.kind == PairKind::custom ? "the nearest place of its hinge is sought"
-                            : !loop.is_coupling() && loop.pair.kind == PairKind::curve ? "the nearest place of its curve is sought"
-                                                                                        : nullptr;
-    if (why) throw ModelError("loop '" + loop.name + "' cannot be compiled: " + why + "; constrained_dynamics() keeps it");
-  }
-}
-
-}  // namespace
-
 kernels::Tape recorded_on_loops(const Multibody& model, const std::shared_ptr<const ResolvedLoops>& loops, const double* q, const double* v, const double* tau, size_t most) {
-  check_rows(*loops);
+  check_on_tape<Recorded>(*loops);
   Recording recording(most);
   std::vector<Recorded> inputs[3];
   const double* const values[] = {q, v, tau};

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "numerics/recorded.h"
 #include "operators/alphabet.h"
 #include "operators/embedded_values.h"
 #include "runtime/errors.h"
@@ -143,6 +142,5 @@ Expression embedded_letter(const std::shared_ptr<EmbeddedOperators>& source, con
   std::unique_ptr<SkoValues<S>> EmbeddedOperators::make_values(S) const { return std::make_unique<EmbeddedValues<S>>(*this); }
 PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
-std::unique_ptr<SkoValues<Recorded>> EmbeddedOperators::make_values(Recorded) const { return nullptr; }
 
 }  // namespace pycraft

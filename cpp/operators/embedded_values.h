@@ -26,10 +26,12 @@ inline std::vector<char> rigid_nodes(const EmbeddedOperators& source) {
   return rigid;
 }
 
-// A⁻¹ of an n x n matrix by elimination with complete pivoting; false where a pivot is below singular_of_loops of the largest entry.
+// A⁻¹ of an n x n matrix by elimination with complete pivoting; false where a pivot is below singular_of_loops of the largest entry. Recorded, in the
+// order of one state, where pivots are above a hundredth.
 template <class S>
 bool invert_with_complete_pivoting(std::vector<S> A, int n, std::vector<S>& inverse) {
   using std::abs;
+  constexpr double least = is_recorded<S> ? 0.01 : singular_of_loops;
   S largest(0);
   for (const S& a : A) largest = maximum(largest, S(abs(a)));
   inverse.assign(size_t(n) * n, S(0));
@@ -40,10 +42,10 @@ bool invert_with_complete_pivoting(std::vector<S> A, int n, std::vector<S>& inve
     int row = k, place = 0;
     for (int i = k; i < n; ++i)
       for (size_t c = 0; c < free_columns.size(); ++c)
-        if (abs(A[size_t(i) * n + free_columns[c]]) > abs(A[size_t(row) * n + free_columns[place]])) row = i, place = static_cast<int>(c);
+        if (abs(soft(A[size_t(i) * n + free_columns[c]])) > abs(soft(A[size_t(row) * n + free_columns[place]]))) row = i, place = static_cast<int>(c);
     const int column = free_columns[place];
     const S pivot = A[size_t(row) * n + column];
-    if (!(abs(pivot) > S(singular_of_loops) * largest)) return false;
+    if (!(abs(pivot) > S(least) * largest)) return false;
     free_columns.erase(free_columns.begin() + place);
     column_of[k] = column;
     for (int j = 0; j < n; ++j) std::swap(A[size_t(row) * n + j], A[size_t(k) * n + j]), std::swap(inverse[size_t(row) * n + j], inverse[size_t(k) * n + j]);
@@ -109,7 +111,10 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
     grouped_.move_to(q, v);
     compiled_ = source_.model().compiled<S>();
     loops_ = source_.loops()->resolved();
-    convert(q, compiled_->nq, q_), convert(v, compiled_->nv, v_);
+    q_.resize(compiled_->nq), v_.resize(compiled_->nv);
+    for (int i = 0; i < compiled_->nq; ++i) q_[i] = of_state<S>(q[i], 0, i);
+    for (int i = 0; i < compiled_->nv; ++i) v_[i] = of_state<S>(v[i], 1, i);
+    check_on_tape<S>(*loops_);
   }
 
   void fill() override {
@@ -222,7 +227,7 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
   }
   bool moves(int g, const LoopMotion<S>& along) const {
     const std::vector<int>& own = source_.coordinates_of(g);
-    return source_.loops_of(g) && (!along.twists.empty() || std::any_of(own.begin(), own.end(), [&](int i) { return along.w[i] != S(0); }));
+    return source_.loops_of(g) && (!along.twists.empty() || std::any_of(own.begin(), own.end(), [&](int i) { return !vanishes(along.w[i]); }));
   }
   // The loops whose rows are solved in node g.
   ResolvedLoops loops_of(int g) const {
@@ -298,9 +303,10 @@ class EmbeddedValues final : public TreeValues<MixedBlocks<RigidBlocks<S>>> {
   void check_on_the_loops(LoopBuffers<S>& buffers) const {
     std::vector<S> residual(loops_->rows);
     loop_residuals(*compiled_, *loops_, q_.data(), buffers, residual.data());
+    using std::abs;
     for (int row = 0; row < loops_->rows; ++row)
-      if (const double off = std::abs(to_double(residual[row])); !(off <= std::max(off_the_loops, 64 * to_double(epsilon<S>()))))
-        throw EvaluationError("'" + source_.model().name() + "' is not on its loops: row '" + loops_->names[row] + "' is off by " + std::to_string(off) +
+      if (!(abs(residual[row]) <= S(std::max(off_the_loops, 64 * to_double(epsilon<S>())))))
+        throw EvaluationError("'" + source_.model().name() + "' is not on its loops: row '" + loops_->names[row] + "' is off by " + std::to_string(std::abs(to_double(residual[row]))) +
                               "; embedded loops have numbers at states of assemble()");
   }
   void check_velocities() const {

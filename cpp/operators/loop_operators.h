@@ -59,7 +59,7 @@ class LoopOperators final : public DerivedOperators {
   Space space(SpaceKind kind, const SymbolArguments& arguments) const override;
   // StaleOperatorError where loops were added or taken away since.
   void check_current() const override;
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   int place_of(const std::string& frame);

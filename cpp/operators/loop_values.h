@@ -69,7 +69,10 @@ class LoopValues final : public TreeValues<RigidBlocks<S>> {
   void set_state(const double* q, const double* v) override {
     compiled_ = source_.model().compiled<S>();
     loops_ = source_.loops().resolved();
-    convert(q, compiled_->nq, q_), convert(v, compiled_->nv, v_);
+    q_.resize(compiled_->nq), v_.resize(compiled_->nv);
+    for (int i = 0; i < compiled_->nq; ++i) q_[i] = of_state<S>(q[i], 0, i);
+    for (int i = 0; i < compiled_->nv; ++i) v_[i] = of_state<S>(v[i], 1, i);
+    check_on_tape<S>(*loops_);
   }
   void fill() override {}
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "numerics/recorded.h"
 #include "operators/derived_values.h"
 #include "runtime/errors.h"
 
@@ -104,7 +105,7 @@ RerootedTree::RerootedTree(std::shared_ptr<MultibodyOperators> base, std::vector
     : DerivedOperators(turned_structure(base->structure(), order), base->name() + ", another root", base), order_(std::move(order)) {}
 #define PYCRAFT_MAKE_VALUES(S) \
   std::unique_ptr<SkoValues<S>> RerootedTree::make_values(S) const { return std::make_unique<RerootedValues<S>>(*this); }
-PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_MAKE_VALUES)
+PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_MAKE_VALUES)
 #undef PYCRAFT_MAKE_VALUES
 
 }  // namespace pycraft

@@ -20,7 +20,7 @@ class RerootedTree final : public DerivedOperators {
   RerootedTree(std::shared_ptr<MultibodyOperators> base, int root);
   int root() const { return order_.front(); }               // the new one, by its number in the model
   const std::vector<int>& order() const { return order_; }  // of the model's bodies here
-  PYCRAFT_FOR_EACH_SCALAR(PYCRAFT_OVERRIDE_MAKE_VALUES)
+  PYCRAFT_FOR_EACH_SCALAR_AND_RECORDED(PYCRAFT_OVERRIDE_MAKE_VALUES)
 
  private:
   RerootedTree(std::shared_ptr<MultibodyOperators> base, std::vector<int> order);

@@ -21,5 +21,7 @@ using SecondDerivatives = Tangent<Derivatives, 4>;
   PYCRAFT_FOR_EACH_SCALAR(X)                                                                                                    \
   X(First<Single>) X(First<double>) X(First<Extended>) X(First<Quad>) X(First<Digits50>) X(First<Digits100>) X(Derivatives)      \
   X(Second<Single>) X(Second<double>) X(Second<Extended>) X(Second<Quad>) X(Second<Digits50>) X(Second<Digits100>) X(SecondDerivatives)
+// Those that are written down: X(Recorded), by itself and with derivatives.
+#define PYCRAFT_FOR_EACH_RECORDED(X) X(Recorded) X(First<Recorded>) X(Second<Recorded>)
 
 }  // namespace pycraft

@@ -82,11 +82,13 @@ void curve_rows(const Curve& curve, const RelativeMotion<S>& m, S* residual, Vec
   for (int i = 0; i < 2; ++i) residual[i] = rows[i].value, gradients[i] = rows[i].gradient, rates[i] = rows[i].rate;
 }
 
-// A search is not written down; loops on curves are refused before (dynamics/recorded_on_loops.cpp).
-template <>
-void curve_rows(const Curve&, const RelativeMotion<Recorded>&, Recorded*, Vector6<Recorded>*, Recorded*) {
-  throw EvaluationError("rows of a point on a curve are sought, and cannot be written down");
-}
+// A search is not written down; such loops are refused before, by name (loop_pairs.h, check_on_tape).
+#define PYCRAFT_NO_ROWS(S)                                                                                                  \
+  template <>                                                                                                            \
+  void curve_rows(const Curve&, const RelativeMotion<S>&, S*, Vector6<S>*, S*) {                                   \
+    throw EvaluationError("rows of a point on a curve are sought, and cannot be written down");                                      \
+  }
+PYCRAFT_FOR_EACH_RECORDED(PYCRAFT_NO_ROWS)
 
 #define PYCRAFT_CURVE_ROWS(S) template void curve_rows(const Curve&, const RelativeMotion<S>&, S*, Vector6<S>*, S*);
 PYCRAFT_FOR_EACH_CARRIED(PYCRAFT_CURVE_ROWS)

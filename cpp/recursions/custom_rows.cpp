@@ -243,11 +243,13 @@ void custom_rows(const Multibody& permitted, const Pose<S>& X, const Vector6<S>&
   }
 }
 
-// A search is not written down; loops of such hinges are refused before (dynamics/recorded_on_loops.cpp).
-template <>
-void custom_rows(const Multibody&, const Pose<Recorded>&, const Vector6<Recorded>&, Recorded*, Vector6<Recorded>*, Recorded*) {
-  throw EvaluationError("rows of a hinge that is any sequence of subhinges are sought, and cannot be written down");
-}
+// A search is not written down; such loops are refused before, by name (loop_pairs.h, check_on_tape).
+#define PYCRAFT_NO_ROWS(S)                                                                                                  \
+  template <>                                                                                                            \
+  void custom_rows(const Multibody&, const Pose<S>&, const Vector6<S>&, S*, Vector6<S>*, S*) {                                   \
+    throw EvaluationError("rows of a hinge that is any sequence of subhinges are sought, and cannot be written down");                                      \
+  }
+PYCRAFT_FOR_EACH_RECORDED(PYCRAFT_NO_ROWS)
 
 #define PYCRAFT_CUSTOM_ROWS(S) template void custom_rows(const Multibody&, const Pose<S>&, const Vector6<S>&, S*, Vector6<S>*, S*);
 PYCRAFT_FOR_EACH_CARRIED(PYCRAFT_CUSTOM_ROWS)

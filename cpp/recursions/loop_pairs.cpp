@@ -5,6 +5,7 @@
 #include "model/recorded_model.h"
 #include "model/unit_data.h"
 #include "recursions/carried.h"
+#include "runtime/errors.h"
 
 namespace pycraft {
 
@@ -75,10 +76,23 @@ Pose<S> find_rows_and_columns(const CompiledModel<S>& model, const ResolvedLoop&
   return m.X;
 }
 
+void refuse_on_tape(const ResolvedLoops& loops) {
+  for (const ResolvedLoop& one : loops.loops) {
+    const Loop& loop = *one.loop;
+    const char* const why = loop.coupling.function ? "it is a function of Python's"
+                            : loop.is_coupling() ? nullptr
+                            : loop.pair.kind == PairKind::screw ? "a screw counts its turns"
+                            : loop.pair.kind == PairKind::custom ? "the nearest place of its hinge is sought"
+                            : loop.pair.kind == PairKind::curve ? "the nearest place of its curve is sought"
+                                                                : nullptr;
+    if (why) throw ModelError("loop '" + loop.name + "' cannot be compiled: " + why + "; the call itself, and expressions at(q), keep it");
+  }
+}
+
 #define PYCRAFT_LOOP_PAIRS(S)                                                                                                                      \
   template RelativeMotion<S> find_rows(const CompiledModel<S>&, const ResolvedLoop&, const S*, const S*, MotionPart, LoopBuffers<S>&);             \
   template Pose<S> find_rows_and_columns(const CompiledModel<S>&, const ResolvedLoop&, const S*, LoopBuffers<S>&);
 PYCRAFT_FOR_EACH_CARRIED(PYCRAFT_LOOP_PAIRS)
-PYCRAFT_LOOP_PAIRS(Recorded)
+PYCRAFT_FOR_EACH_RECORDED(PYCRAFT_LOOP_PAIRS)
 
 }  // namespace pycraft

@@ -37,4 +37,11 @@ RelativeMotion<S> find_rows(const CompiledModel<S>& model, const ResolvedLoop& l
 template <class S>
 Pose<S> find_rows_and_columns(const CompiledModel<S>& model, const ResolvedLoop& loop, const S* q, LoopBuffers<S>& w);
 
+// ModelError that names a loop whose rows decide by more than comparisons, and so are on no tape.
+void refuse_on_tape(const ResolvedLoops& loops);
+template <class S>
+inline void check_on_tape(const ResolvedLoops& loops) {
+  if constexpr (is_recorded<S>) refuse_on_tape(loops);
+}
+
 }  // namespace pycraft

@@ -123,6 +123,6 @@ void pair_rows(const FramePair& pair, const RelativeMotion<S>& m, PairRow<S>* ou
 
 #define PYCRAFT_PAIR_ROWS(S) template void pair_rows(const FramePair&, const RelativeMotion<S>&, PairRow<S>*);
 PYCRAFT_FOR_EACH_CARRIED(PYCRAFT_PAIR_ROWS)
-PYCRAFT_PAIR_ROWS(Recorded)
+PYCRAFT_FOR_EACH_RECORDED(PYCRAFT_PAIR_ROWS)
 
 }  // namespace pycraft

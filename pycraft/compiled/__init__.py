@@ -1,7 +1,7 @@
-"""Code generated for one model: what a plan or a kernel does, written out as straight-line C++, built by the system's compiler and loaded.
+"""Code generated for one model: what the core computes, written as straight-line C++, built by the system's compiler and loaded.
 
-`trace` holds numbers that remember how they came about, `kernels` and `frames` run the direct calls on them, `expressions` the recursion of
-an expression; `source` writes the C++, `build` keeps what was built, `compiled` is the callable.
+The core records a kernel, a recursion or the plan of an expression on a tape: `kernels` and `expressions` ask for it, `tapes` reads it,
+`graph` shortens it, `source` writes the C++, `build` keeps what was built, `compiled` is the callable.
 """
 
 from .compiled import Compiled, compile_call, compile_expression

@@ -17,10 +17,9 @@ from ..arguments import text
 from ..models.multibody import describe
 from .build import built
 from .expressions import ExpressionGraph
-from .frames import frame_graph
-from .kernels import INPUTS, ON_LOOPS, kernel_graph, loops_graph
+from .graph import Graph
+from .kernels import INPUTS, ON_LOOPS, frame_graph, kernel_graph, loops_graph
 from .source import FUNCTION, written
-from .trace import Graph
 
 MOST_OPERATIONS, MOST_RESULTS = 100_000, 20_000
 """Beyond which a compiler takes minutes over straight lines, and a state's results more than a stack may hold."""
@@ -132,7 +131,7 @@ def _of_frame(model: Any, call: str, frame: str, q: Any, out: Any = None) -> Any
 
 def compile_expression(expression: Any, request: str = "apply") -> Any:
     """What `Operator.compile` and `Scalar.compile` give."""
-    made = ExpressionGraph(expression, request)
+    made = ExpressionGraph(expression, request, 4 * MOST_OPERATIONS)
     numbers = _numbers_of(made.model)
     ordinary = partial(_evaluated, expression, request, made, numbers)
 
@@ -168,7 +167,7 @@ def _evaluated(expression: Any, request: str, made: ExpressionGraph, numbers: by
     for b in range(1 if count is None else count):
         state = {name: a[b] if a.ndim == 2 else a for name, a in arrays.items()}
         q, v = (state.pop(name, None) if made.model is not None else None for name in "qv")
-        vectors = {made.vectors[name]: state.pop(name) for name in list(state) if name in made.vectors}
+        vectors = {name: state.pop(name) for name in made.vectors}
         bound = expression if q is None else expression.at(q, v) if v is not None else expression.at(q)
         x = next(iter(state.values()), None)
         result[... if count is None else b] = bound.value(**vectors) if vectors else _requested(bound, request, x)

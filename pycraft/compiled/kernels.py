@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from .trace import Graph
+from .graph import Graph
+from .tapes import graph_of
 
 BESIDE = 0.1
 """How far, in radians and metres, the state at which dynamics on loops is written down is moved from the model's own."""
@@ -32,70 +33,29 @@ def kernel_graph(model: Any, call: str) -> tuple[Graph, np.ndarray]:
             f"{call} of {model.name!r} cannot be compiled: no kernel knows a rotor on a ball or free hinge, nor some sliders behind "
             "other subhinges; its expressions can be"
         )
-    graph, results = _graph_of(tape, INPUTS[call][-1])
+    graph, results = graph_of(tape, ["q", "v", INPUTS[call][-1]])
     shape = (model.nv, model.nv) if call in ("mass_matrix", "mass_matrix_inverse") else (model.nv,)
     return graph, results.reshape(shape)
+
+
+def frame_graph(model: Any, call: str, frame: str) -> tuple[Graph, np.ndarray]:
+    """The graph of "pose" or "jacobian" of a frame that the model has, and the nodes of its result."""
+    graph, results = graph_of(_core.frame_tape(model, call, frame), ["q"])
+    return graph, results.reshape((4, 4) if call == "pose" else (6, model.nv))
+
+
+def states_to_record(model: Any) -> list[Any]:
+    """Return states at which code is recorded, on the loops of the model: near its own state, then others. Special states decide as no other does."""
+    rng = np.random.default_rng(0)
+    near = model.integrate(model.q, rng.uniform(-BESIDE, BESIDE, model.nv))
+    starts = [(near, rng.uniform(-1, 1, model.nv)), *((s.q, s.v) for s in (model.random_state(k) for k in (1, 2)))]
+    return [model.assemble(q, v) for q, v in starts]
 
 
 def loops_graph(model: Any, most: int) -> tuple[Graph, np.ndarray]:
     """The graph of accelerations on loops, and the nodes of its result, as they are decided beside the model's own state.
 
-    That is moved a little, as special states decide as no other does. ModelError where `most` operations are not enough, or the loops have
-    what cannot be compiled, or cannot be assembled.
+    ModelError where `most` operations are not enough, or the loops have what cannot be compiled, or cannot be assembled.
     """
-    generator = np.random.default_rng(0)
-    beside = model.integrate(model.q, generator.uniform(-BESIDE, BESIDE, model.nv))
-    state = model.assemble(beside, generator.uniform(-1, 1, model.nv))
-    tape = model.loops._core.tape(state.q, state.v, generator.uniform(-1, 1, model.nv), most)
-    return _graph_of(tape, "tau")
-
-
-def _graph_of(tape: Any, third: str) -> tuple[Graph, np.ndarray]:
-    """A tape (cpp/bindings/tapes.h) as a graph; `third` is what its third array is called."""
-    graph = Graph()
-    does, taken, number, results, guards = tape
-    made: list[int] = []
-    truths: dict[int, list[int]] = {}
-    for at, (what, (a, b, c), x) in enumerate(zip(does, taken.tolist(), number.tolist(), strict=True)):
-        node = -1
-        match what:
-            case "number":
-                node = graph.number(x).index
-            case "q" | "v" | "u":
-                node = graph.input(third if what == "u" else what, a).index
-            case "both":
-                truths[at] = truths[a] + truths[b]
-            case "equal":
-                pass  # a guard, of what is compared
-            case "root" | "logarithm":
-                node = graph.put("sqrt" if what == "root" else "log", made[a])
-            case "negate" | "sine" | "cosine" | "magnitude":
-                node = graph.put(what, made[a])
-            case "fused":
-                node = graph.put("add", graph.put("multiply", made[a], made[b]), made[c])
-            case "choose":
-                node = graph.put("choose", made[a], made[b], made[c])
-            case _:
-                node = graph.put(what, made[a], made[b])
-        if what in ("greater", "at_least"):
-            truths[at] = [node]
-        made.append(node)
-    for truth, holds in guards:
-        a, b = (made[i] for i in taken[truth][:2].tolist())
-        graph.guards += truths[truth] if holds and truth in truths else _instead(graph, does[truth], a, b, holds)
-    graph.guards = list(dict.fromkeys(graph.guards))
-    return graph, np.array([made[r] for r in results], int)
-
-
-def _instead(graph: Graph, what: str, a: int, b: int, holds: bool) -> list[int]:
-    """Guards that hold where a comparison does not, or where it is an equality that does."""
-    match what, holds:
-        case "greater", False:
-            return [graph.put("at_least", b, a)]
-        case "at_least", False:
-            return [graph.put("greater", b, a)]
-        case "equal", True:
-            return [graph.put("at_least", a, b), graph.put("at_least", b, a)]
-        case "equal", False:
-            return [graph.put("greater", graph.put("magnitude", graph.put("subtract", a, b)), graph.zero)]
-    raise _core.EvaluationError(f"a guard of kind {what!r} is not known")  # no tape leaves one
+    state = states_to_record(model)[0]
+    return graph_of(model.loops._core.tape(state.q, state.v, np.random.default_rng(1).uniform(-1, 1, model.nv), most), ["q", "v", "tau"])

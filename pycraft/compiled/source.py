@@ -13,7 +13,7 @@ from importlib import resources
 import numpy as np
 
 from .. import _core
-from .trace import CONSTANT, INPUT, Graph, operands
+from .graph import CONSTANT, INPUT, Graph, operands
 
 FUNCTION = "pycraft_run"
 _KNOWN = ("q", "v", "x", "tau", "vdot")
@@ -22,7 +22,8 @@ _PIECE = 1000
 _SIGNS = {"add": " + ", "subtract": " - ", "multiply": " * ", "divide": " / "}
 _STRENGTH = {"add": 1, "subtract": 1, "negate": 2, "multiply": 3, "divide": 3}
 _COMPARED = {"greater": " > ", "at_least": " >= "}
-_CALLED = {"magnitude": "magnitude_of", "larger": "larger_of", "sqrt": "root_of", "log": "log_of", "sine": "sine_of", "cosine": "cosine_of"}
+_CALLED = {"magnitude": "magnitude_of", "larger": "larger_of", "sqrt": "root_of", "log": "log_of", "sine": "sine_of", "cosine": "cosine_of",
+           "fraction": "fraction_of", "exponent": "exponent_of"}
 
 
 def _runtime(name: str) -> str:

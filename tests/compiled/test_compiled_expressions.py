@@ -9,6 +9,7 @@ from support.closed_models import closed_four_bar
 from support.graphs import evaluated
 
 EPS = np.finfo(float).eps
+MOST = 400_000
 
 TREES = {
     "several subhinges": lambda: pc.tree([-1, 0, 1, 1], ["universal", "planar", "gimbal", "cylindrical"], seed=2),
@@ -58,7 +59,10 @@ def at_states(model, expression, request, made, count=3):
     wanted = []
     for b, s in enumerate(drawn):
         bound = expression.at(s.q, s.v) if isinstance(expression, pc.Operator) else expression.at(s.q)
-        value = bound @ x[0][b] if x else getattr(bound, request)() if request != "apply" else bound.dense().ravel()
+        if isinstance(bound, pc.Scalar):
+            value = float(bound)
+        else:
+            value = bound @ x[0][b] if x else getattr(bound, request)() if request != "apply" else bound.dense().ravel()
         wanted.append(float(value) if request in ("logdet", "trace", "norm") else value)
     return inputs, np.array(wanted)
 
@@ -66,24 +70,24 @@ def at_states(model, expression, request, made, count=3):
 @pytest.mark.parametrize("wanted", EXPRESSIONS)
 @pytest.mark.parametrize("tree", TREES)
 def test_graphs_are_the_plans(tree, wanted):
-    """To the rounding of sums over bodies times the condition of what is inverted."""
+    """To the rounding of sums over bodies times the condition of what is inverted, and at every state that guards admit, all but of eliminations."""
     model = TREES[tree]()
     model.gravity = (0.3, -9.0, 1.0)
     make, request = EXPRESSIONS[wanted]
     expression = make(model.soa)
-    made = ExpressionGraph(expression, request)
+    made = ExpressionGraph(expression, request, MOST)
     inputs, exact = at_states(model, expression, request, made)
     found, sound = evaluated(made.graph, made.results, inputs)
     condition = np.linalg.cond(model.mass_matrix(inputs["q"])).max()
-    assert sound.all()
-    assert np.abs(found - exact).max() <= 400 * model.nv * EPS * condition * max(np.abs(exact).max(), 1e-3)
+    assert sound.all() or (sound.any() and wanted in ("not a theorem", "its ln det"))
+    assert np.abs(found - exact)[sound].max() <= 400 * model.nv * EPS * condition * max(np.abs(exact).max(), 1e-3)
 
 
 def test_derivatives():
     model = TREES["several subhinges"]()
     for coordinate in (0, 3, 5):
         expression = model.soa.MM.diff(coordinate)
-        made = ExpressionGraph(expression, "apply")
+        made = ExpressionGraph(expression, "apply", MOST)
         inputs, exact = at_states(model, expression, "apply", made)
         found, _ = evaluated(made.graph, made.results, inputs)
         np.testing.assert_allclose(found, exact, rtol=0, atol=400 * EPS * np.abs(exact).max())
@@ -92,7 +96,7 @@ def test_derivatives():
 def test_what_is_bound_is_folded_in():
     model = TREES["screws, balls, sliders"]()
     s = model.random_state(4)
-    made = ExpressionGraph(model.soa.MM.inv().at(s.q), "apply")
+    made = ExpressionGraph(model.soa.MM.inv().at(s.q), "apply", MOST)
     assert made.arguments == [("x", model.nv)] and made.model is None
     assert not any(name in ("sine", "divide") for name, *_ in (made.graph.operations[n] for n in made.graph.needed(made.results.ravel())))
     x = np.linspace(-1, 1, model.nv)
@@ -188,30 +192,81 @@ def test_what_cannot_be_compiled():
     with pytest.raises(pc.EvaluationError, match="'dense'"):
         one.soa.MM.compile("blockdiag")
     with pytest.raises(pc.EvaluationError, match="one model"):
-        ExpressionGraph(one.soa.MM.trace() + other.soa.MM.trace(), "apply")
+        ExpressionGraph(one.soa.MM.trace() + other.soa.MM.trace(), "apply", MOST)
     with pytest.raises(pc.EvaluationError, match="operations"):
         pc.chain(60).soa.X_world.compile("dense")
 
 
-def test_letters_known_at_one_state_alone_are_refused_by_name():
-    """Ruling 36: code is a function of the state. These would keep their values at the model's present one."""
-    model, bars = pc.chain(4), closed_four_bar()
-    grouped, free, loops = model.soa.grouped([["body1", "body2"]]), model.soa.free(["hinge1"]), bars.soa.embedded(["crank"])
-    for op, what in (
-        (grouped.MM, "grouped bodies"),
-        (model.soa.MM + grouped.MM, "grouped bodies"),
-        (grouped.MM.logdet() + model.soa.MM.trace(), "grouped bodies"),
-        (free.MM, "free or of prescribed"),
-        (free.Schur_complement, "free or of prescribed"),
-        (model.soa.prescribed(["hinge1"]).D.trace(), "free or of prescribed"),
-        (loops.MM, "embedded loops"),
-        (loops.X_r, "embedded loops"),
-    ):
-        with pytest.raises(pc.EvaluationError, match=f"compile\\(\\) cannot record .*{what}.*at\\(q\\)"):
-            op.compile()
-    for op in (bars.soa.Q, bars.soa.Q @ bars.soa.MM.inv() @ bars.soa.Q.T):
-        with pytest.raises(pc.EvaluationError, match="no recursion is written for Q, rows of loops"):
-            op.compile()
+def of_parts(model):
+    """Expressions of trees that are made of a model's, and requests of them."""
+    soa = model.soa
+    grouped = soa.grouped([["body1", "body2"]])
+    return {
+        "grouped": (grouped.MM.inv(), "apply"),
+        "grouped, ln det": (grouped.MM, "logdet"),
+        "grouped beside its own": (soa.MM + grouped.MM, "dense"),
+        "scalars of both": (grouped.MM.logdet() + 2 * soa.MM.trace(), "apply"),
+        "free": (soa.free(["hinge1"]).MM.inv(), "apply"),
+        "prescribed": (soa.prescribed(["hinge1"]).D.trace(), "apply"),
+        "Schur complement": (soa.free(["hinge1"]).Schur_complement, "dense"),
+        "derivative": (grouped.MM.diff(2), "dense"),
+    }
+
+
+@pytest.mark.parametrize("name", of_parts(pc.chain(3)))
+def test_parts_compile_as_functions_of_the_state(name):
+    """Ruling 36: today's state, at which the code is made, is not in it."""
+    model = pc.chain(4)
+    model.q = model.random_state(9).q
+    expression, request = of_parts(model)[name]
+    made = ExpressionGraph(expression, request, MOST)
+    inputs, exact = at_states(model, expression, request, made)
+    found, sound = evaluated(made.graph, made.results, inputs)
+    assert sound.all()
+    condition = np.linalg.cond(model.mass_matrix(inputs["q"])).max()
+    assert np.abs(found - exact).max() <= 400 * model.nv * EPS * condition * np.abs(exact).max()
+
+
+OF_LOOPS = {
+    "embedded": lambda of, soa: (of.MM, "dense"),
+    "embedded, inverse": lambda of, soa: (of.MM.inv(), "apply"),
+    "embedded, ln det": lambda of, soa: (of.MM.logdet(), "apply"),
+    "X_r": lambda of, soa: (of.X_r, "dense"),
+    "Ẋ_r": lambda of, soa: (of.X_r_dot, "dense"),
+    "derivative": lambda of, soa: (of.MM.diff(0), "dense"),
+    "second derivative": lambda of, soa: (of.MM.diff(0).diff(0), "dense"),
+    "Q": lambda of, soa: (soa.Q, "dense"),
+    "Q derivative": lambda of, soa: (soa.Q.diff("crank"), "dense"),
+    "Q ℳ⁻¹ Q*": lambda of, soa: (soa.Q @ soa.MM.inv() @ soa.Q.T, "dense"),
+}
+
+
+@pytest.mark.parametrize("name", OF_LOOPS)
+def test_loops_compile_as_functions_of_the_state(name):
+    """At most states on the loops; at others, and at states off them where loops are embedded, a guard does not hold and the plan answers."""
+    model = closed_four_bar()
+    embedded = model.soa.embedded(["crank"])
+    expression, request = OF_LOOPS[name](embedded, model.soa)
+    made = ExpressionGraph(expression, request, MOST)
+    drawn = [model.assemble(model.random_state(seed), seed=seed) for seed in range(8)]
+    inputs = {"q": np.array([s.q for s in drawn]), "v": np.array([s.v for s in drawn])}
+    inputs["x"] = np.random.default_rng(2).normal(size=(len(drawn), dict(made.arguments).get("x", 0)))
+    found, sound = evaluated(made.graph, made.results, inputs)
+    assert sound.mean() >= 0.5
+    for b in np.flatnonzero(sound):
+        s = drawn[b]
+        bound = expression.at(s.q, s.v) if isinstance(expression, pc.Operator) else expression.at(s.q)
+        value = float(bound) if isinstance(expression, pc.Scalar) else bound @ inputs["x"][b] if request == "apply" else bound.dense()
+        np.testing.assert_allclose(found[b], value, rtol=0, atol=1e-10 * np.abs(value).max())
+    if "Q" not in name:
+        assert not evaluated(made.graph, made.results, inputs | {"q": inputs["q"] + 0.1})[1].any()
+
+
+def test_loops_whose_rows_are_sought_are_refused_by_name():
+    model = pc.chain(3)
+    model.add_coupling(["hinge0", "hinge1"], function=lambda q: (q[0] - q[1], [1, -1], np.zeros((2, 2))), name="cam")
+    with pytest.raises(pc.ModelError, match="'cam' cannot be compiled: it is a function"):
+        model.soa.Q.compile()
 
 
 def test_letters_known_at_one_state_are_compiled_there():

@@ -191,7 +191,7 @@ AREAS = {
     "cpp/kernels/mirror.h": ["dynamics/test_packs.py", "dynamics/test_kernels.py"],
     "cpp/kernels/articulated_links.h": ["dynamics/test_subtrees_in_threads.py"],
     "cpp/dynamics/subtrees.h": ["dynamics/test_subtrees_in_threads.py"],
-    "pycraft/compiled/trace.py": ["compiled/test_trace.py", "compiled/test_compiled_expressions.py"],
+    "pycraft/compiled/graph.py": ["compiled/test_graph.py", "compiled/test_compiled_expressions.py"],
     "pycraft/compiled/source.py": ["compiled/test_compiled_calls.py"],
     "pycraft/compiled/expressions.py": ["compiled/test_compiled_expressions.py"],
     "pycraft/compiled/kinematics.py": ["compiled/test_compiled_expressions.py"],
@@ -274,7 +274,6 @@ AREAS = {
         "scenes/test_rows_of_rounding.py",
     ],
     "cpp/simulation/effects/loop_penalty.cpp": ["scenes/test_penalty_loops.py"],
-    "pycraft/dynamics/embedded_motion.py": ["dynamics/test_embedded_motion.py"],
     "cpp/operators/grouped_values.h": ["algebra/test_mixed_trees.py"],
 }
 

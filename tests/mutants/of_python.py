@@ -24,11 +24,6 @@ CHANGES = {
     "pycraft/viewer/effect_fields.py": [("a refused parameter stays", "        setattr(changed, field, present)\n", "        pass\n")],
     "pycraft/scenes/run_page.py": [("the end of a run is no frame", "np.append(times, last) if", "times if")],
     "pycraft/view/web_page.py": [("names are markup", '.replace("<", "\\\\u003c")', "")],
-    "pycraft/dynamics/embedded_motion.py": [
-        ("independent coordinates are never exchanged", "<= worst:", "<= 1e300:"),
-        ("dependent coordinates stay where steps have brought them", "if not self.rows.size:", "if True:"),
-        ("θ̇_r of the old choice goes on", "np.concatenate([q, v[self.independent]])", "np.concatenate([q, v[: len(self.independent)]])"),
-    ],
     "pycraft/dynamics/second_order.py": [
         ("effects bend twice", "out[..., :n, :n] -= forces / 2", "out[..., :n, :n] -= forces"),
         ("stages are all at the step's beginning", "Stage(at, part * dt,", "Stage(at, 0 * dt,"),
@@ -290,7 +285,7 @@ CHANGES = {
             "parents=tuple(p - (p >= k and p > 0) for p in parents)",
         ),
     ],
-    "pycraft/compiled/trace.py": [
+    "pycraft/compiled/graph.py": [
         (
             "a difference the other way round is the same",
             'return self._node("subtract", a, b) if swapped is None else self._negate(swapped)',

@@ -1,4 +1,4 @@
-"""Graphs of traced numbers (pycraft/compiled/trace.py) evaluated by NumPy, states side by side, with no compiler."""
+"""Graphs (pycraft/compiled/graph.py): written by arithmetic, and evaluated by NumPy, states side by side, with no compiler."""
 
 import operator
 
@@ -19,7 +19,61 @@ FUNCTIONS = {
     "greater": operator.gt,
     "at_least": operator.ge,
     "choose": np.where,
+    "fraction": lambda x: np.frexp(x)[0],
+    "exponent": lambda x: np.frexp(x)[1].astype(float),
 }
+
+
+class Node:
+    """A node of a graph with operators of Python."""
+
+    def __init__(self, graph, index):
+        self.graph, self.index = graph, index
+
+    @property
+    def value(self):
+        return self.graph.constant_of(self.index)
+
+    def put(self, name, *others):
+        return Node(self.graph, self.graph.put(name, self.index, *(self.of(x).index for x in others)))
+
+    def of(self, x):
+        return x if isinstance(x, Node) else Node(self.graph, self.graph.number(x))
+
+    def __add__(self, x):
+        return self.put("add", x)
+
+    def __sub__(self, x):
+        return self.put("subtract", x)
+
+    def __mul__(self, x):
+        return self.put("multiply", x)
+
+    def __truediv__(self, x):
+        return self.put("divide", x)
+
+    def __radd__(self, x):
+        return self.of(x) + self
+
+    def __rsub__(self, x):
+        return self.of(x) - self
+
+    def __rmul__(self, x):
+        return self.of(x) * self
+
+    def __rtruediv__(self, x):
+        return self.of(x) / self
+
+    def __neg__(self):
+        return self.put("negate")
+
+    def __abs__(self):
+        return self.put("magnitude")
+
+
+def inputs(graph, array, count):
+    """Return the first entries of an input as nodes."""
+    return [Node(graph, graph.input(array, i)) for i in range(count)]
 
 
 def values(graph, inputs):

@@ -40,6 +40,10 @@ inline S root_of(const S& x) { return each(x, [](double y) { return std::sqrt(y)
 template <class S>
 inline S log_of(const S& x) { return each(x, [](double y) { return std::log(y); }); }
 template <class S>
+inline S fraction_of(const S& x) { return each(x, [](double y) { int n; return std::frexp(y, &n); }); }
+template <class S>
+inline S exponent_of(const S& x) { return each(x, [](double y) { int n; std::frexp(y, &n); return double(n); }); }
+template <class S>
 inline S sine_of(const S& x) { return sine_cosine(wide(x)).sine.v; }
 template <class S>
 inline S cosine_of(const S& x) { return sine_cosine(wide(x)).cosine.v; }

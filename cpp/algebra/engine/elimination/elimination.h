@@ -51,6 +51,14 @@ struct BlockStorage {
   const S* at(int k) const { return data.data() + offset[k]; }
 };
 
+namespace elimination {
+
+// Whether a recorded run is written down as source (written_plan.h): its guard is the solve whose solution is known, and none of natural right sides,
+// which are three quarters of the operations.
+bool for_source();
+
+}  // namespace elimination
+
 template <class S>
 class TreeElimination {
  public:

@@ -84,7 +84,7 @@ bool TreeElimination<S>::factor(Blocks&& blocks, Values&& values, S tolerated) {
     assemble(blocks, values);
     if (eliminate()) {
       growth_ = lost();
-      const bool solved = natural_sides_are_solved(half);
+      const bool solved = (is_recorded<S> && elimination::for_source()) || natural_sides_are_solved(half);
       if (growth_ <= tolerated && solved) return true;
       off_tape(growth_);
       where = "elimination body by body loses " + (growth_ <= tolerated ? "all" : elimination::digits(growth_)) + " digits";

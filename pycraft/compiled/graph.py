@@ -1,21 +1,19 @@
-"""Numbers that remember how they came about: what is computed with them becomes straight-line code.
+"""Graphs of operations, made shorter: what is on a tape of the core (cpp/lanes/tape.h), before it becomes straight-line code.
 
-A `Traced` is a node of a graph: a constant, an input, or an operation on nodes. Operations on constants are carried out, what adds zero or
-multiplies by zero or one is left out, and equal operations are one node. What is divided by one number is multiplied by its one
-reciprocal, which rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one. So loops, tables and zeros of a
-recursion that runs on such numbers are gone from what it leaves behind.
+A node is a constant, an input, or an operation on nodes, known by its number. Operations on constants are carried out, a sum with zero and a
+product with zero or one are left out, and equal operations are one node. A division becomes a product with the reciprocal of the divisor,
+which is computed once and rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one.
 
-Leaving out 0 x is exact for finite x alone; what is built of a graph looks through its inputs and results for others (source.py).
+Leaving out 0 x is exact for finite x alone; the code that is built of a graph checks that its inputs and results are finite (source.py).
 """
 
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-__all__ = ["Graph", "Traced"]
+__all__ = ["Graph"]
 
 CONSTANT, INPUT = "constant", "input"
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
@@ -24,72 +22,9 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sqrt": lambda x: math.sqrt(x) if x >= 0 else math.nan,
     "log": lambda x: math.log(x) if x > 0 else math.nan,
     "magnitude": abs,
+    "fraction": lambda x: math.frexp(x)[0],
+    "exponent": lambda x: float(math.frexp(x)[1]),
 }
-
-
-class Traced:
-    """A number of a graph. It takes part in arithmetic with numbers and arrays of objects; comparisons of it are not known yet."""
-
-    __slots__ = ("graph", "index")
-
-    def __init__(self, graph: Graph, index: int):
-        self.graph, self.index = graph, index
-
-    @property
-    def value(self) -> float | None:
-        """The number, where it is a constant."""
-        return self.graph.constant_of(self.index)
-
-    def _with(self, operation: str, other: Any, swapped: bool = False) -> Any:
-        if not isinstance(other, (Traced, int, float)):
-            if not isinstance(other, numbers.Real):
-                return NotImplemented  # an array takes it entry by entry
-        a, b = self.index, self.graph.number(other).index
-        return Traced(self.graph, self.graph.put(operation, *((b, a) if swapped else (a, b))))
-
-    def __add__(self, other: Any) -> Any:
-        return self._with("add", other)
-
-    def __sub__(self, other: Any) -> Any:
-        return self._with("subtract", other)
-
-    def __mul__(self, other: Any) -> Any:
-        return self._with("multiply", other)
-
-    def __truediv__(self, other: Any) -> Any:
-        return self._with("divide", other)
-
-    __radd__, __rmul__ = __add__, __mul__
-
-    def __rsub__(self, other: Any) -> Any:
-        return self._with("subtract", other, swapped=True)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self._with("divide", other, swapped=True)
-
-    def __neg__(self) -> Traced:
-        return self.function("negate")
-
-    def __abs__(self) -> Traced:
-        return self.function("magnitude")
-
-    def __pow__(self, exponent: Any) -> Traced:
-        if exponent != 2:
-            raise TypeError("a traced number has no power but its square")
-        return self * self
-
-    def __bool__(self) -> bool:
-        raise TypeError("whether a traced number is zero is not known before it has a value")
-
-    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # undecided
-    __hash__ = None  # type: ignore[assignment]  # as nothing is equal
-
-    def function(self, name: str) -> Traced:
-        """negate, sine, cosine, sqrt, log or magnitude of it."""
-        return Traced(self.graph, self.graph.put(name, self.index))
-
-    def __repr__(self) -> str:
-        return f"Traced({self.graph.operations[self.index]})"
 
 
 class Graph:
@@ -119,23 +54,13 @@ class Graph:
         operation = self.operations[index]
         return operation[1] if operation[0] == CONSTANT else None
 
-    def number(self, x: Any) -> Traced:
-        """A constant, or what is traced already."""
-        return x if isinstance(x, Traced) else Traced(self, self._node(CONSTANT, float(x) + 0.0))  # no -0
+    def number(self, x: float) -> int:
+        """The node of a constant."""
+        return self._node(CONSTANT, float(x) + 0.0)  # no -0
 
-    def input(self, array: str, entry: int) -> Traced:
-        """Entry `entry` of an input."""
-        return Traced(self, self._node(INPUT, array, entry))
-
-    def inputs(self, array: str, size: int) -> list[Traced]:
-        """All entries of an input."""
-        return [self.input(array, i) for i in range(size)]
-
-    def guard(self, larger: Any, smaller: Any) -> None:
-        """Results may be trusted only where larger > smaller."""
-        node = self.put("greater", self.number(larger).index, self.number(smaller).index)
-        if node not in self.guards:
-            self.guards.append(node)
+    def input(self, array: str, entry: int) -> int:
+        """The node of an entry of an input."""
+        return self._node(INPUT, array, entry)
 
     def put(self, name: str, *taken: int) -> int:
         """The node of an operation; an older one where it comes to the same."""
@@ -145,17 +70,17 @@ class Graph:
     # ------------------------------------------------------------------ what is folded
     def _function(self, name: str, a: int) -> int:
         x = self.constant_of(a)
-        return self._node(name, a) if x is None else self.number(_FUNCTIONS[name](x)).index
+        return self._node(name, a) if x is None else self.number(_FUNCTIONS[name](x))
 
     def _of_constants(self, a: int, b: int, operate: Any) -> int | None:
         x, y = self.constant_of(a), self.constant_of(b)
-        return None if x is None or y is None else self.number(operate(x, y)).index
+        return None if x is None or y is None else self.number(operate(x, y))
 
     def _negate(self, a: int) -> int:
         operation = self.operations[a]
         match operation[0]:
             case "constant":
-                return self.number(-operation[1]).index
+                return self.number(-operation[1])
             case "negate":
                 return operation[1]
         return self._node("negate", a)
@@ -180,7 +105,7 @@ class Graph:
         if negative is not None:
             return self._subtract(b, negative)
         if self._are_one(a, b) or self._are_one(b, a):
-            return self.number(1).index
+            return self.number(1)
         return self._node("add", *sorted((a, b)))
 
     def _are_one(self, a: int, b: int) -> bool:
@@ -188,9 +113,9 @@ class Graph:
         cosine, product = self.operations[a], self.operations[b]
         if cosine[0] != "cosine" or product[0] != "multiply":
             return False
-        half = self.put("multiply", self.number(0.5).index, cosine[1])
+        half = self.put("multiply", self.number(0.5), cosine[1])
         sine = self._known.get(("sine", half))
-        return sine is not None and b == self._multiply(self._multiply(self.number(2).index, sine), sine)
+        return sine is not None and b == self._multiply(self._multiply(self.number(2), sine), sine)
 
     def _subtract(self, a: int, b: int) -> int:
         if a == b:
@@ -221,7 +146,7 @@ class Graph:
             if factor == 1:
                 return y
             if factor < 0:  # signs go outward, where sums take them in
-                return self._negate(self._multiply(self.number(-factor).index, y))
+                return self._negate(self._multiply(self.number(-factor), y))
             inner = self.operations[y]
             if inner[0] == "multiply" and self.constant_of(inner[1]) is not None and math.log2(factor) == int(math.log2(factor)):
                 return self._multiply(self._multiply(x, inner[1]), inner[2])  # by a power of two: exact in any order
@@ -241,11 +166,11 @@ class Graph:
         if known is not None:
             return known
         if self.constant_of(b) is not None:
-            return self._multiply(a, self.number(1 / divisor if (divisor := self.constant_of(b)) else math.nan).index)
+            return self._multiply(a, self.number(1 / divisor if (divisor := self.constant_of(b)) else math.nan))
         negative = self._negated(a)
         if negative is not None:
             return self._negate(self._divide(negative, b))
-        return self._multiply(a, self._node("divide", self.number(1).index, b))  # one reciprocal, whatever is divided by b
+        return self._multiply(a, self._node("divide", self.number(1), b))  # one reciprocal, whatever is divided by b
 
     def _sqrt(self, a: int) -> int:
         operation = self.operations[a]
