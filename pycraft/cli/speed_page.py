@@ -180,22 +180,23 @@ Written by `pycraft bench --peers --page docs/performance.md`: no figure on this
 
 Compare only figures of one run: they differ between machines.
 
-Times are microseconds. Each is the least median of several rounds on one core, after a warm-up; the two times of a ratio are taken in turns. A
-ratio is the other package's time over ours: above one ours is faster; ✓ meets its goal, ✗ misses it. All results are compared in the run that
-times them, and agree to {WRONG:g} of the largest entry with every package, or, where no package runs, with our own in extended precision.
+Times are microseconds. Each is the least median of several rounds on one core, after a warm-up; the two times of a ratio are taken in
+turns. A ratio is the other package's time over ours: above one ours is faster; ✓ meets its goal, ✗ misses it. All results are compared in
+the run that times them, and agree to {WRONG:g} of the largest entry with every package, or, where no package runs, with our own in
+extended precision.
 
-*C++* is our call in the core, its checks included, over {STATES} states in rotation. For forward and inverse dynamics of up to
-100 coordinates, Pinocchio's time in C++ is the time of its own C++ loops over states (`abaInParallel`, `rneaInParallel`, one thread); otherwise it is its
-call from Python less the same call on a model without joints and less the copies of matrices that its bindings make. *Python* is a call
-from Python on existing arrays; the ratio is to the fastest package.
+*C++* is our call in the core, its checks included, over {STATES} states in rotation. For forward and inverse dynamics of up to 100
+coordinates, Pinocchio's time in C++ is the time of its own C++ loops over states (`abaInParallel`, `rneaInParallel`, one thread);
+otherwise it is its call from Python less the same call on a model without joints and less the copies of matrices that its bindings make.
+*Python* is a call from Python on existing arrays; the ratio is to the fastest package.
 
 {_compared(found)}
-ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python also fills both triangles, and its time includes this. MuJoCo's calls have
-contacts and constraints disabled; its `mj_forward` computes positions, inertias, their factors and accelerations, and the
-time does not include setting a state. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest joints; robots are
-used as in their files, legged ones on a free base. Λ is computed for the last body, 6 × 6, and for the last and the middle body together, 12 × 12,
-if both move in every direction; Pinocchio's time covers only its inverse, which remains to be inverted, less the time on a model of
-one joint.
+ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python also fills both triangles, and its time includes this. MuJoCo's
+calls have contacts and constraints disabled; its `mj_forward` computes positions, inertias, their factors and accelerations, and the time
+does not include setting a state. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest
+joints; robots are used as in their files, legged ones on a free base. Λ is computed for the last body, 6 × 6, and for the last and the
+middle body together, 12 × 12, if both move in every direction; Pinocchio's time covers only its inverse, which remains to be inverted,
+less the time on a model of one joint.
 
 ## Goals
 
@@ -211,8 +212,9 @@ instruction set: {asked}.
 {_markdown(BATCH_HEADINGS, batch_cells(found))}
 ## Code for one model
 
-Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, compared with the ordinary call and Pinocchio's in
-C++; ratios to the compiled call. Code built on the machine that runs it uses all of its instructions, including fused ones.
+Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, compared with the ordinary call and
+Pinocchio's in C++; ratios to the compiled call. Code built on the machine that runs it uses all of its instructions, including fused
+ones.
 
 {_markdown(COMPILED_HEADINGS, compiled_cells(found), words=3)}
 ## Growth of cost

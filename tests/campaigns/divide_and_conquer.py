@@ -23,9 +23,9 @@ THREADS = 2
 
 PAGE = """# Divide and conquer
 
-`forward_dynamics(..., method="divide-and-conquer")` computes the accelerations of the articulated-body algorithm along a critical path of O(log N):
-segments of the tree are joined two by two, independent segments in different threads (`threads=`), with the same
-bits in any number of threads. It is meant for many cores; on the measured machine the articulated method is faster.
+`forward_dynamics(..., method="divide-and-conquer")` computes the accelerations of the articulated-body algorithm along a critical path of
+O(log N): segments of the tree are joined two by two, independent segments in different threads (`threads=`), with the same bits in any
+number of threads. It is meant for many cores; on the measured machine the articulated method is faster.
 
 ```python
 >>> import numpy as np
@@ -65,14 +65,14 @@ No pivot and no spread of inertias shows how many digits of a solution are corre
 r = T - (ℳ + J) θ̈ - 𝒞        δ = (ℳ + J)⁻¹ r
 ```
 
-are formed, r by the two sweeps of Newton–Euler with forces gathered in a wider precision, δ with the existing segments. If |δ| is at
-most 100 eps √nv |θ̈|, the loss without cancellation, the solution is accepted. Otherwise δ is added, as long as it shrinks and
-exceeds the possible rounding of r, and the remaining error is bounded: by the last δ, or by the largest correction in any direction that this rounding can
-produce (`cpp/algebra/trees/sweeps/residual_rounding.h`). A solution that may be wrong beyond six digits (64 √eps) is refused
-with an error that names the hinge where the digits were lost. So a tip of 10⁹ times the mass is solved to rounding, one of 10¹² on ten links to
-six digits or refused, and with heavier tips rounding hides the loss from the residual; `form="ud"` of the articulated method keeps
-all digits. `tests/dynamics/test_divide_and_conquer.py` asserts this, and on well-proportioned trees ten times the errors of the fast
-form, or 100 eps √N where the fast form happens to be more accurate.
+are formed, r by the two sweeps of Newton–Euler with forces gathered in a wider precision, δ with the existing segments. If |δ| is at most
+100 eps √nv |θ̈|, the loss without cancellation, the solution is accepted. Otherwise δ is added, as long as it shrinks and exceeds the
+possible rounding of r, and the remaining error is bounded: by the last δ, or by the largest correction in any direction that this
+rounding can produce (`cpp/algebra/trees/sweeps/residual_rounding.h`). A solution that may be wrong beyond six digits (64 √eps) is refused
+with an error that names the hinge where the digits were lost. So a tip of 10⁹ times the mass is solved to rounding, one of 10¹² on ten
+links to six digits or refused, and with heavier tips rounding hides the loss from the residual; `form="ud"` of the articulated method
+keeps all digits. `tests/dynamics/test_divide_and_conquer.py` asserts this, and on well-proportioned trees ten times the errors of the
+fast form, or 100 eps √N where the fast form happens to be more accurate.
 
 Accelerations that are zero up to rounding, of bodies at rest under forces that cancel, have no digits of their own: the accepted error is
 100 eps √nv of gravity, ω² and forces over inertias.
@@ -93,11 +93,11 @@ conquer over the articulated method, one thread each. Apart: the relative differ
 Load average of the last five minutes at the end: {load}. Above 1 other work used part of the cores, and the columns on two threads,
 their gain and the estimate by Amdahl's law are not properties of the method; run the script on a quiet machine.
 
-The method does not pay on this machine. A join takes 1,400 to 4,000 operations and its segment a kilobyte; a link of the articulated method takes some 400,
-in kernels of the machine's instruction set. On a chain of {links} links that is {ratio} times the time on one thread; two threads gain
-{gain}. With no other loss it takes {ideal} cores to draw level; by Amdahl's law, with the share of {serial} that two threads leave serial
-here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started six times a state, some 50 µs
-each time, and the residual is one thread's sweep: below 10⁴ links threads gain nothing.
+The method does not pay on this machine. A join takes 1,400 to 4,000 operations and its segment a kilobyte; a link of the articulated
+method takes some 400, in kernels of the machine's instruction set. On a chain of {links} links that is {ratio} times the time on one
+thread; two threads gain {gain}. With no other loss it takes {ideal} cores to draw level; by Amdahl's law, with the share of {serial} that
+two threads leave serial here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started six
+times a state, some 50 µs each time, and the residual is one thread's sweep: below 10⁴ links threads gain nothing.
 
 Batches do not need this method: `threads=` shares their states out with the articulated method, in packs, and it also shares out trees with
 several large subtrees. The remaining use is one state of one very long chain on a machine with many cores.

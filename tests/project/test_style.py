@@ -14,7 +14,6 @@ ROOT = Path(__file__).parents[2]
 # Files and folders that are not edited yet. Take off what has been edited; the list ends empty.
 NOT_EDITED = [
     "cpp",
-    "notebooks",
     "pycraft",
     "tests",
 ]
