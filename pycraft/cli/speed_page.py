@@ -213,8 +213,7 @@ instruction set: {asked}.
 ## Code for one model
 
 Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, compared with the ordinary call and
-Pinocchio's in C++; ratios to the compiled call. Code built on the machine that runs it uses all of its instructions, including fused
-ones.
+Pinocchio's in C++; ratios to the compiled call. Code built where it runs uses all instructions of the machine.
 
 {_markdown(COMPILED_HEADINGS, compiled_cells(found), words=3)}
 ## Growth of cost
@@ -226,9 +225,8 @@ derivatives twice and three times as many.
 ## Cost of accuracy
 
 Forward dynamics in other forms and precisions, as a ratio to form `fast` in double, timed in turn; errors against quad precision; ✓ is
-within its bound, ✗ over it. Direct calls of forward dynamics run kernels in every row here.
-The purpose of each method:
-[accuracy.md](accuracy.md).
+within its bound, ✗ over it. Direct calls of forward dynamics run kernels in every row here. [accuracy.md](accuracy.md)
+describes each method.
 
 {_markdown(COST_HEADINGS, cost_cells(costs))}
 ## Not measured
