@@ -1,4 +1,4 @@
-"""What code shows in the viewer: places are those that were given, names replace, and what cannot be shown is refused."""
+"""Objects that code shows in the viewer: places are as given, names replace, and invalid objects are refused."""
 
 import numpy as np
 import pytest
