@@ -1,22 +1,22 @@
-"""What is said of a motion whose steps are held by stability, not by accuracy."""
+"""Warnings for motion with steps limited by stability, not by accuracy."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-TAKE = "Take integrator='rosenbrock4', or 'auto', which takes it where the motion is stiff"
-TAKE_DOUBLE = "Take integrator='rosenbrock4' in precision='double', or a softer law"
+TAKE = "Use integrator='rosenbrock4', or 'auto', which uses it where the motion is stiff"
+TAKE_DOUBLE = "Use integrator='rosenbrock4' in precision='double', or a softer law"
 
 
 def stiffness_text(of: str, integrator: str, found: Mapping[str, Any], remedy: str) -> str:
-    """The text of a warning.
+    """Return the text of a warning.
 
     Parameters
     ----------
-    of : what is stiff, as "the scene of 'arm'"
-    found : of the core: t and step (s), left (steps of that size to the end), rate (1/s, negative; 0 where only the stages of the method's
-        steps show it), the effect whose forces decay so fast and the coordinate that they act on ("" where not known)
+    of : the stiff system, as "the scene of 'arm'"
+    found : from the core: t and step (s), left (steps of that size to the end), rate (1/s, negative; 0 if only the stages of the method's
+        steps show it), the effect with forces of that decay rate and the coordinate on which they act ("" if unknown)
     remedy : a sentence
     """
     what = "the motion decays faster than that"
@@ -25,5 +25,5 @@ def stiffness_text(of: str, integrator: str, found: Mapping[str, Any], remedy: s
         what = f"{by} coordinate '{found['coordinate']}' at a rate of {-found['rate']:.2g} /s"
     return (
         f"{of} is stiff: integrator {integrator!r} takes steps of {found['step']:.2g} s at t = {found['t']:.3g} s, "
-        f"which stability holds and not accuracy, {found['left']:.2g} of them to the end; {what}. {remedy}"
+        f"limited by stability and not by accuracy, {found['left']:.2g} of them to the end; {what}. {remedy}"
     )
