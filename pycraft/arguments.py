@@ -32,16 +32,16 @@ def of_state(state: int, states: int) -> Iterator[None]:
 def text(name: Any, what: str) -> str:
     """Return a name. ModelError if it is not a string."""
     if not isinstance(name, str):
-        raise _core.ModelError(f"{what} is called by a text, not by {name!r}")
+        raise _core.ModelError(f"{what} is named by a string, not by {name!r}")
     if any("\ud800" <= c <= "\udfff" for c in name):
-        raise _core.ModelError(f"{what} is called by a text, and {name!r} has half a character, which no file holds")
+        raise _core.ModelError(f"{what} is named by a string, and {name!r} has half a surrogate pair, which no file can store")
     return name
 
 
 def listed(items: Any, what: str) -> list[Any]:
     """Return the items of a list. ModelError if it is not one."""
     if isinstance(items, (str, bytes, dict)) or not isinstance(items, Iterable) or getattr(items, "shape", None) == ():
-        raise _core.ModelError(f"{what}: a list, not {items!r}")
+        raise _core.ModelError(f"{what} must be a list, not {items!r}")
     return list(items)
 
 
@@ -53,7 +53,7 @@ def several(given: Any, alone: type | tuple[type, ...] = str) -> list[Any]:
 def switch(value: Any, what: str) -> bool:
     """Return a switch, on or off. ModelError unless it is True or False: the string "no" would count as on."""
     if not isinstance(value, (bool, np.bool_)):
-        raise _core.ModelError(f"{what}={value!r:.80}: True or False")
+        raise _core.ModelError(f"{what}={value!r:.80}: give True or False")
     return bool(value)
 
 
@@ -99,7 +99,7 @@ def thermal_energy(temperature: Any, boltzmann: Any, refusal: type[Exception], o
 def chosen(name: Any, what: str) -> str:
     """Return the name given for an option; the core checks that it exists. EvaluationError if it is not a string."""
     if not isinstance(name, str):
-        raise _core.EvaluationError(f"{what}={name!r:.80}: a name")
+        raise _core.EvaluationError(f"{what}={name!r:.80}: give a name")
     return name
 
 
@@ -186,8 +186,9 @@ class FixedMapping(dict[Any, Any]):
 
 def fixed(value: Any) -> Any:
     """Return an immutable copy of a user's value: read-only arrays, and lists, mappings and sets that cannot be changed.
-A piecewise polynomial of SciPy is copied with its arrays; any other value is returned as it is, and so is a read-only array that owns its
-data.
+
+    A piecewise polynomial of SciPy is copied with its arrays; any other value is returned as it is, and so is a read-only array that owns
+    its data.
     """
     if type(value) is np.ndarray and value.base is None and not value.flags.writeable:
         return value

@@ -37,6 +37,6 @@ def _called(thing: Any) -> str:
 
 def _remedy(kind: type, name: str, known: list[str]) -> str:
     if hasattr(kind, name):
-        return ", which is read or called only" + (f"; set are {', '.join(known)}" if known else "")
+        return ", which cannot be set" + (f"; settable: {', '.join(known)}" if known else "")
     near = get_close_matches(name.lower(), known, 1) or get_close_matches(name.lower(), [n for n in dir(kind) if not n.startswith("_")], 1)
-    return f"; did you mean {near[0]!r}?" if near else f"; set are {', '.join(known)}" if known else "; nothing of it is set"
+    return f"; did you mean {near[0]!r}?" if near else f"; settable: {', '.join(known)}" if known else "; none of its attributes can be set"

@@ -25,8 +25,9 @@ class State(Closed):
 
 def at_state(model: Any, q: Any = None, v: Any = None) -> tuple[Any, Any]:
     """Return the q and v of a call, by the one rule of direct calls and of `Operator.at`.
-Without q: the model's present state, with its v unless v is given. With a State: its q, and its v unless v is given. With an array q: zero
-velocities unless v is given.
+
+    Without q: the model's present state, with its v unless v is given. With a State: its q, and its v unless v is given. With an array q:
+    zero velocities unless v is given.
     """
     if q is None:
         return model.q, model.v if v is None else getattr(v, "v", v)

@@ -148,7 +148,7 @@ def _simulated(scene: Any, options: dict[str, Any], output: Path | None) -> Any:
         before = getattr(error, "run", None)
         if output is not None and before is not None and len(before):
             _write(before, output)
-            note(f"wrote {output}, as far as it had come: to {before.t[-1]:g} s")
+            note(f"wrote {output} up to {before.t[-1]:g} s")
         raise
 
 

@@ -203,7 +203,9 @@ def _check_embedding(form: str, residual: str, alpha: float, beta: float) -> Non
             f"residual={residual!r} of method='embed': only 'same' is available; use a wider precision, or method='augment'"
         )
     if alpha or beta:
-        raise _core.EvaluationError("alpha and beta need method='augment', where they draw states to the loops; assemble(q, v) projects them")
+        raise _core.EvaluationError(
+            "alpha and beta need method='augment', where they draw states to the loops; assemble(q, v) projects them"
+        )
 
 
 class _OfLoops(Mapping[str, Any]):

@@ -121,9 +121,7 @@ class DirectCalls:
         if not isinstance(method, str):
             raise _core.EvaluationError(f"method={method!r}: give a name, 'articulated', 'cholesky', ...")
         if form != "fast" or refine != 0 or residual != "same" or on_singular != "raise":
-            raise _core.EvaluationError(
-                f"method {method!r} has no form, no refinement and no other answer to singular hinges; those are the articulated method's"
-            )
+            raise _core.EvaluationError(f"method {method!r} takes no form=, refine=, residual= or on_singular=; only 'articulated' does")
         return by_method(self, method, q, v, tau, precision, out, threads)
 
     def prepare(self, call: str, *, batch: int | None = None, **options: Any) -> Callable[..., Any]:

@@ -75,8 +75,8 @@ def solved_on_loops(
     left = [mode.coordinates for mode in made.modes if mode.stability == "unstable"]
     raise _core.EvaluationError(
         f"{model.name!r}: no stable equilibrium was found on the loops; the last is unstable along "
-        f"{' and along '.join(', '.join(one) for one in left)}: start elsewhere (q0=), hold these coordinates (hold=), or take what there is "
-        "(stable=False)"
+        f"{' and along '.join(', '.join(one) for one in left)}: start elsewhere (q0=), hold these coordinates (hold=), or take what "
+        "there is (stable=False)"
     )
 
 

@@ -370,6 +370,6 @@ def _refuse_unexcited(model: Any, unknown: _Unknowns, base: Base, found: LeastSq
     weakest[np.abs(weakest) < 1e-6] = 0.0
     told = _written(weakest, [unknown.names[i] for i in base.columns], most=4)
     raise _core.EvaluationError(
-        f"{count} states of {model.name!r} tell {found.rank} of {len(base.columns)} base parameters, and nothing along {told}: log motion "
-        "that excites it, or look for the parameters of some bodies alone (bodies=)"
+        f"{count} states of {model.name!r} determine {found.rank} of {len(base.columns)} base parameters, and not {told}: log motion "
+        "that excites it, or identify only some bodies (bodies=)"
     )

@@ -191,7 +191,8 @@ def nearest_bodies(
         import clarabel
     except ImportError:
         raise ImportError(
-            f"least squares give parameters that are not physically possible; the nearest possible need clarabel: {HOLDS}; or take consistent=False"
+            f"least squares give parameters that are not physically possible; the nearest that are "
+            f"need clarabel: {HOLDS}; or take consistent=False"
         ) from None
     from scipy import linalg, sparse
 

@@ -100,7 +100,9 @@ class InterbodyCalls:
         rows = hinge_numbers(self, hinges)
         if switch(loops, "loops"):
             if known:
-                raise _core.ModelError("interbody forces on the loops follow from tau: accelerations alone do not tell the loops' forces")
+                raise _core.ModelError(
+                    "interbody forces on the loops follow from tau: accelerations alone do not determine the loops' forces"
+                )
             how: dict[str, Any] = {"form": form, "refine": refine, "residual": residual, "precision": precision}
             model: Any = self
             on_loops = model.constrained_dynamics(q, v, tau, wrenches=wrenches, wrench_axes=wrench_axes, **how)
@@ -139,7 +141,7 @@ class InterbodyCalls:
             return reaction
         of_hinges = {"part": options.pop("part", "whole")}
         if is_reaction(of_hinges["part"]):
-            raise _core.EvaluationError("part='reaction' of a base reaction is of hinges; loops=True takes part='whole'")
+            raise _core.EvaluationError("part='reaction' of a base reaction applies to hinges; with loops=True use part='whole'")
         q, v = at_state(self, q, v)
         on_base_by_loops = loop_wrenches(self, model.constrained_dynamics(q, v, tau, **options).forces, q, True)[1]
         return reaction - in_axes(self, q, on_base_by_loops, np.eye(4), axes, about)

@@ -24,8 +24,8 @@ class StatisticalCalls:
         precision: str = "double",
     ) -> np.ndarray:  # fmt: skip
         """Draw velocities from exp(-KE/kT), rotor inertia included: θ̇ = √(kT) [I - HψK]* D^(-*/2) n, n unit normal. O(N) per draw.
-D^½ is a factor with D^½ D^(*/2) = D.
-        D^½ is the factor whose product with its transpose D is.
+
+        D^½ is a factor with D^½ D^(*/2) = D.
 
         Each of the innovations D^½[I + HφK]*θ̇ has the energy ½kT; covariances are kT (ℳ + J)⁻¹.
 

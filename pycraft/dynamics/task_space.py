@@ -437,7 +437,5 @@ def _rows(frame: str, directions: Any) -> tuple[np.ndarray, list[str]]:
     sizes = np.abs(rows).max(axis=1)
     if (out := (sizes < 1 / LARGEST_ROW) | (sizes > LARGEST_ROW)).any():
         row = int(out.argmax())
-        raise _core.ModelError(
-            f"directions of {frame!r}: row {row}, of size {sizes[row]:.3g}, overflows: use other units"
-        )
+        raise _core.ModelError(f"directions of {frame!r}: row {row}, of size {sizes[row]:.3g}, overflows: use other units")
     return rows, [f"{frame}.{i}" for i in range(len(rows))]

@@ -59,7 +59,7 @@ def from_scipy(linear_operator: Any, domain: _core.Space, codomain: _core.Space,
     from scipy.sparse.linalg import LinearOperator
 
     if not isinstance(name, str):
-        raise _core.ModelError(f"an operator is called by a text, not by {name!r:.60}")
+        raise _core.ModelError(f"an operator is named by a string, not by {name!r:.60}")
     for what, space in (("domain", domain), ("codomain", codomain)):
         if not isinstance(space, _core.Space):
             raise _core.SpaceError(f"from_scipy: {what} is a space, as arm.soa.phi.{what}, not {space!r:.60}")

@@ -132,7 +132,7 @@ class Assembler:
         if (off / self.sizes).max(initial=0) > self.tolerance * asked + _STOPPED:
             said = _worst(self.model.loops.rows, off)
             raise _core.ModelError(
-                f"no velocities of {self.model.name!r} keep its loops{self.keeping()}: left are {said}; fix fewer, or give others"
+                f"no velocities of {self.model.name!r} keep its loops{self.keeping()}: these remain: {said}; fix fewer, or give others"
             )
         return v
 
@@ -154,13 +154,13 @@ class Assembler:
                 alone.append(loop.name)
         open_ = [loop.name for loop in loops.values() if (residual / self.sizes)[loop.slice].max(initial=0) > self.tolerance]
         why = (
-            f"{_named(alone)} cannot be closed even without the others"
+            f"{_named(alone)} cannot be closed even alone"
             if alone
-            else f"each can be closed by itself, and {_named(open_)} not together with the others"
+            else f"each can be closed by itself, but {_named(open_)} not together with the others"
         )
         return _core.ModelError(
             f"{self.model.name!r} cannot be assembled{self.keeping()}, from {count} start{'s' if count > 1 else ''}: {why}. At the nearest "
-            f"that was found, left are {_worst(rows, residual)}; change lengths or kept values, or start elsewhere (q0, starts=)"
+            f"state found these remain: {_worst(rows, residual)}; change lengths or kept values, or start elsewhere (q0, starts=)"
         )
 
 

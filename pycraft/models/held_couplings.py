@@ -48,8 +48,7 @@ def with_held(declared: Mapping[str, Any], held: Mapping[str, np.ndarray]) -> di
     if not terms or function is None and not any(np.any(np.asarray(own)[1:]) for *_, own in terms):
         names = ", ".join(map(repr, dict.fromkeys(hinge for hinge, *_ in whole["terms"])))
         raise _core.ModelError(
-            f"coupling {whole['name']!r} would have no coordinate left to hold, of {names}: lock fewer of them, as it holds the others, or "
-            "remove it first"
+            f"coupling {whole['name']!r} would have no free coordinate left, of {names}: lock fewer of them, or remove it first"
         )
     held_now = {hinge: np.array(q, float) for hinge, q in held.items()}
     return whole | {"terms": terms, "constant": constant, "function": function, "whole": whole, "held": held_now}

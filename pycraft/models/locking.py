@@ -105,7 +105,7 @@ class Locking(Grafting):
             rate = ", ".join(f"{x:.6g}" for x in v[slices[moving][1]])
             raise _core.ModelError(
                 f"hinge {names[moving]!r} moves (v = {rate}) and is locked at rest only;"
-                " impulsive=True stops it by an impulse and says what energy that loses"
+                " impulsive=True stops it by an impulse and reports the lost energy"
             )
         after, impulses = (v, np.zeros(self.nv)) if moving is None else self._stop_at_once(numbers)
         stop = self._stopped(names, slices, v, after, impulses)

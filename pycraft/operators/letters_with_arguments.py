@@ -27,10 +27,12 @@ class LetterWithArguments:
     def __call__(self, argument: str | int | Sequence[str], directions: Any = None, **of_frames: Any) -> _core.Operator:
         """Return the operator of these nodes (or, for Delta, along this coordinate).
 
-        Only Jacobian takes `relative_to`, `axes`, `coordinates`, for one frame, including loose ones: as `Frame.jacobian_operator`. Only
-Lambda takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for one node also
-names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, the inertia along these directions. It exists even if B*ΩB
-is singular, as for an arm of fewer than six hinges, provided that every motion along the directions is possible.
+        Only Jacobian takes `relative_to`, `axes`, `coordinates`, for one frame, including loose ones: as `Frame.jacobian_operator`.
+
+        Only Lambda takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for
+        one node also names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, the inertia along these
+        directions. It exists even if B*ΩB is singular, as for an arm of fewer than six hinges, provided that every motion along the
+        directions is possible.
         """
         source = self._operators._source
         if of_frames:

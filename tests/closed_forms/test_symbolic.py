@@ -330,7 +330,7 @@ def test_what_has_no_closed_form_is_said():
         symbolic(model, parameters="letters")
     with pytest.raises(pc.ModelError, match="a parameter and a coordinate of one name"):
         symbolic(model, parameters={("body0", "mass"): sympy.Symbol("q1", real=True)})
-    with pytest.raises(pc.ModelError, match="made of a Multibody"):
+    with pytest.raises(pc.ModelError, match="need a Multibody"):
         symbolic(soa)
     with pytest.raises(pc.ModelError, match="no coordinate"):
         forms.Delta("elbow")

@@ -82,7 +82,7 @@ def says(tmp_path):
         ("[[bodies]]\nmass = 1", ':1: body number 1 has no name; give it one: name = "..."'),
         (A + "axis = [0, 0, 1]\naxes = [[0, 0, 1]]", ":4: body 'a': give axis or axes, not both"),
         (A + "rpy = [0, 0, 1]\nquaternion = [1, 0, 0, 0]", ":4: body 'a' has rpy and quaternion; give one of them"),
-        (A + "quaternion = [0, 0, 0, 0]", ":3: body 'a': quaternion has no length to speak of; no rotation is [1, 0, 0, 0]"),
+        (A + "quaternion = [0, 0, 0, 0]", ":3: body 'a': quaternion has zero length; the identity is [1, 0, 0, 0]"),
         (A + 'hinge = "custom"', ':3: body \'a\': a custom hinge has subhinges = [{kind = "pin", axis = [0, 0, 1]}, ...]'),
         (A + SUBHINGES + '{ axis = [0, 0, 1] },\n]', ':7: body \'a\': subhinge 1 has no kind; give it one: kind = "pin"'),
         (A + "point = [1, 0, 0]\n" + SUBHINGES + "]", ":3: body 'a' has subhinges and point; each subhinge has its own"),

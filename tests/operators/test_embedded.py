@@ -178,7 +178,7 @@ def test_refusals():
     by_rocker = model.soa.embedded([third])
     with pytest.raises(pc.EvaluationError, match=f"do not follow from '{third}', which are no .*; '({first}|{second})' are"):
         by_rocker.MM.at(dead).dense()
-    with pytest.raises(pc.ModelError, match="do not tell where the others are"):
+    with pytest.raises(pc.ModelError, match="do not determine the others"):
         model.soa.embedded([third], q=dead)
     with pytest.raises(pc.EvaluationError, match="row 'closure: about x' hangs on the others, and is broken"):
         soa.MM.diff(model.hinges[second].symbol("axis", "x")).dense()

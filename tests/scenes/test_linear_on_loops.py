@@ -251,7 +251,7 @@ REFUSED = {
     "of a scene of a tree": (lambda: M.pendulum().linearize(independent=["bob"]), pc.ModelError, r"with effects.Loop\(\)"),
     "too few": (lambda: linkages.five_bar().linearize(loops=True, independent=["inner0"]), pc.ModelError, "have 2 coordinate.*do$"),
     "dependent": (
-        lambda: linkages.n_four_bar(2).linearize(loops=True, independent=["crank0", "rod1"]), pc.ModelError, "do not tell where the others"
+        lambda: linkages.n_four_bar(2).linearize(loops=True, independent=["crank0", "rod1"]), pc.ModelError, "do not determine the others"
     ),
     "twice": (lambda: linkages.five_bar().linearize(loops=True, independent=["inner0"] * 2), pc.ModelError, "has a coordinate twice"),
     "unknown": (lambda: M.five_bar().linearize(independent="iner0"), pc.ModelError, "'iner0'.*did you mean 'inner0'"),

@@ -326,7 +326,7 @@ def pose_matrix(file: XmlFile, element: Element | None, owner: Element) -> np.nd
     if (element.get("rotation_format") or "euler_rpy").strip() == "quat_xyzw":
         values = numbers_of(file, element, 7, owner)
         if not np.linalg.norm(values[3:]) > 1e-8:
-            raise file.error(element, f"{label(owner)}: the quaternion of its <pose> has length 0; no rotation is 0 0 0 1")
+            raise file.error(element, f"{label(owner)}: the quaternion of its <pose> has length 0; the identity is 0 0 0 1")
         X[:3, :3] = rotation_from_quaternion(np.roll(values[3:], 1))
     else:
         values = numbers_of(file, element, 6, owner)

@@ -234,7 +234,7 @@ def _pose(table: TomlTable) -> tuple[Any, list[float] | None]:
         rotation = rotation_from_rpy(*angles)
     if (quaternion := table.vector("quaternion", 4, "four finite numbers: [w, x, y, z]")) is not None:
         if not 1e-8 < np.linalg.norm(quaternion) < np.inf:
-            raise table.error("quaternion", f"{table.label}: quaternion has no length to speak of; no rotation is [1, 0, 0, 0]")
+            raise table.error("quaternion", f"{table.label}: quaternion has zero length; the identity is [1, 0, 0, 0]")
         rotation = rotation_from_quaternion(quaternion)
     return rotation, position
 

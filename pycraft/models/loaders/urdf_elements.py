@@ -155,7 +155,7 @@ class Elements:
             raise self.file.error(origin, f"{label(owner)}: <origin> has rpy and quat_xyzw; give one of them")
         quaternion = self.file.numbers(origin, "quat_xyzw", 4, owner)
         if not np.linalg.norm(quaternion) > 1e-8:
-            raise self.file.error(origin, f"{label(owner)}: <origin> quat_xyzw has length 0; no rotation is 0 0 0 1")
+            raise self.file.error(origin, f"{label(owner)}: <origin> quat_xyzw has length 0; the identity is 0 0 0 1")
         return rotation_from_quaternion(np.roll(quaternion, 1)), position
 
     # ------------------------------------------------------------------ links
