@@ -138,7 +138,7 @@ def test_prepared_hybrid_dynamics_follows_edits(monkeypatch):
         (lambda m: m.prepare("inverse_dynamics_derivatives")(m.q, m.v), TypeError, "takes q, v, vdot; it was given 2"),
         (lambda m: m.prepare("inverse_dynamics_derivatives")(m.q, m.v, m.v, out=m.v), TypeError, "no out="),
         (lambda m: m.prepare("pose", frame="nose"), pc.ModelError, "nose"),
-        (lambda m: m.prepare("pose", frame=3), pc.ModelError, "text, not by 3"),
+        (lambda m: m.prepare("pose", frame=3), pc.ModelError, "string, not by 3"),
         (lambda m: m.prepare("pose", frame="panda_link7")(m.q, out=np.empty((2, 4, 4))), pc.ModelError, r"shape \(4, 4\)"),
         (lambda m: m.pose("panda_link7", m.q, precision="double"), TypeError, "precision"),
         (lambda m: m.mass_matrix(m.q, form="ud"), TypeError, "form"),

@@ -183,7 +183,7 @@ def test_modes_as_text_and_pictures(monkeypatch):
     ax = modes.plot(0, phases=3)
     assert "Hz" in ax.get_title() and len(ax.lines) + len(ax.collections) > 3
     mpl.pyplot.close("all")
-    with pytest.raises(pc.EvaluationError, match="mode 5 is not there; there are 2"):
+    with pytest.raises(pc.EvaluationError, match="there is no mode 5; the model has 2"):
         modes.plot(5)
     with pytest.raises(pc.ModelError, match="mode: a whole number, not 'first'"):
         modes.plot("first")
@@ -284,7 +284,7 @@ def test_a_linear_model_is_true_but_of_no_states():
         (lambda m, f: f.place("v.hinge0", of=None), "of=None: there are 'states', 'inputs' and 'outputs'"),
         (lambda m, f: f.select(inputs="tau.elbow"), "has no input 'tau.elbow'; there are tau.hinge0, tau.hinge1"),
         (lambda m, f: m.linearize([[0, 0]]).modes(), "modes() takes one state; this is a batch of 1: select one by its index"),
-        (lambda m, f: m.linearize([[0, 0]]).to_scipy(), "to_scipy() is of one state"),
+        (lambda m, f: m.linearize([[0, 0]]).to_scipy(), "to_scipy() takes one state"),
         (lambda m, f: m.linearize([0, np.nan]), "entry 0 is nan"),
     ],
 )

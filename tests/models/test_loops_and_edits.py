@@ -154,7 +154,7 @@ def test_a_coupling_holds_by_the_hinges_that_are_locked(tmp_path):
         model.lock("? thigh", impulsive=True)
     assert model.locked == [] and model.nv == 5
     model.lock("l thigh", impulsive=True)
-    with pytest.raises(pc.ModelError, match="coupling 'gear' would have no coordinate left"):
+    with pytest.raises(pc.ModelError, match="coupling 'gear' would have no free coordinate left"):
         model.lock("r thigh", impulsive=True)
 
 

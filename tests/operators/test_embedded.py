@@ -188,7 +188,7 @@ def test_refusals():
         bars.soa.embedded(q=[0, 0, np.pi])
     with pytest.raises(pc.ModelError, match="takes 3 finite numbers"):
         embedded_accelerations(model, tau=[np.nan, 0, 0])
-    with pytest.raises(pc.ModelError, match="no multibody model"):
+    with pytest.raises(pc.ModelError, match="not a complete multibody model"):
         soa.embedded()
 
 

@@ -99,7 +99,7 @@ def test_the_set_of_operators_has_them_too():
         model.soa.B("body7", relative_to="body3")
     with pytest.raises(pc.ModelError, match="one frame, not 2"):
         model.soa.Jacobian(["body7", "body3"], relative_to="body1")
-    with pytest.raises(pc.ModelError, match="has no frames: it is no multibody model"):
+    with pytest.raises(pc.ModelError, match="has no frames: it is not a complete multibody model"):
         model.soa.grouped([["body0", "body1"]]).Jacobian("body7", relative_to="body3")
     with pytest.raises(pc.EvaluationError, match="axes='bdy'"):
         model.soa.Jacobian("body7", axes="bdy")

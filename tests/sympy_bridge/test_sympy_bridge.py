@@ -150,7 +150,7 @@ def test_spaces_are_checked_on_the_way_back(arm):
         from_sympy(phi * phi.T, arm.soa)  # one dimension, two spaces
     with pytest.raises(pc.SpaceError):
         from_sympy(to_sympy(arm.soa.H) * M * to_sympy(arm.soa.H), arm.soa)
-    with pytest.raises(pc.EvaluationError, match="is no operator expression"):
+    with pytest.raises(pc.EvaluationError, match="is not an operator expression"):
         from_sympy(sympy.MatrixSymbol("A", 2, 2), arm.soa)
     with pytest.raises(pc.EvaluationError, match="not a SymPy expression"):
         from_sympy("phi", arm.soa)
