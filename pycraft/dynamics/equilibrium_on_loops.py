@@ -30,7 +30,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class _State:
-    """A state at q: the balance of forces including those of the rows, sizes of the forces, the rows, N of unit inertia, N*g, and λ."""
+    """A state at q: the balance of forces and of the rows, sizes of the forces, the rows, N of unit inertia, N*g, and λ."""
 
     q: np.ndarray
     balance: Balance

@@ -36,7 +36,7 @@ class Solution(Closed):
 
     @property
     def reached(self) -> Any:
-        """Whether every target is within its tolerance."""
+        """True if every target is within its tolerance."""
         return self._shown(self._ended.reached)
 
     @property

@@ -32,7 +32,7 @@ class LinearModel:
     dt : s, None for continuous time
     model, q, v, t : the state at which it was linearized
     tangent : (2 nv + ..., n), for a model on its loops, with independent coordinates as states: the tree's states in terms of these, to
-        first order; None if the states are those of the tree
+        first order; None if the states are the tree's
     """
 
     A: np.ndarray

@@ -14,7 +14,7 @@ from .. import _core
 _DEGREE = 12  # of a function's pieces: at their ends two derivatives have 144²/3 times its error, 1e-10
 _EPS = float(np.finfo(float).eps)
 _HALVES = 24  # of a piece, until it is smooth enough
-_TURN = 0.25  # rad, of the tangent over a quarter of a piece: normals between the ends of one are then close to those of the ends
+_TURN = 0.25  # rad, of the tangent over a quarter of a piece: normals between the ends of one are then close to the normals at the ends
 
 
 class Curve(NamedTuple):

@@ -214,7 +214,7 @@ def delta(base: float = 0.2, plate: float = 0.05, upper: float = 0.3, lower: flo
     """Return a Delta robot: three motors on the ground turn arms, each holds the plate by two parallel rods, so that it moves without
     turning.
 
-    Node "plate" is the centre of its body "platform". Coordinates are those of the free platform, then for each arm its angle below the
+    Node "plate" is the centre of its body "platform". Coordinates belong to the free platform, then for each arm its angle below the
     horizontal and those of its two rods, universal hinges.
 
     Source: R. Clavel, Conception d'un robot parallèle rapide à 4 degrés de liberté, thèse 925, EPFL, 1991.

@@ -181,7 +181,7 @@ class Parts(WithOperators):
         part = self._part
         return [(0, self.nq if which == "q" else self.nv)] if part is None else part[f"{which}_runs"]
 
-    # ------------------------------------------------------------------ states from those of the whole
+    # ------------------------------------------------------------------ states from the states of the whole
     def q_of(self, whole_q: Any = None) -> np.ndarray:
         """Return the part's coordinates from the whole's: (nq,) or (B, nq), a view if they are consecutive there, else a copy.
 

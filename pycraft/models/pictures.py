@@ -102,8 +102,8 @@ class Pictures:
     def dof_shares(self, q=None) -> Any:
         """Return each body's share of the degrees of freedom, tr(Υ(k)M(k)), as values and as colour on the robot. O(N); with rotors O(N²).
 
-        The shares of bodies, and of rotors tr(ℳ⁻¹(k,k)J(k)), add up to the number of coordinates N. Loops are ignored: the shares are those
-        of the tree.
+        The shares of bodies, and of rotors tr(ℳ⁻¹(k,k)J(k)), add up to the number of coordinates N. Loops are ignored: the shares belong
+        to the tree.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class Pictures:
 
         The tree, coordinates and P(k) depend on the chosen base; poses, velocities, accelerations, energy, momentum, ln det ℳ and Υ(k) do
         not: the inertia felt at a body of a free tree is Υ(k)⁻¹ = P(k) + S⁺(k), and the base determines what is outboard. Loops are
-        ignored: all values are those of the tree.
+        ignored: all values belong to the tree.
 
         Parameters
         ----------

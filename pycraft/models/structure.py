@@ -200,7 +200,7 @@ class Structure(Locking):
 
         The free hinge moves to the body and has its pose and twist; hinges on the path from the old root are reversed, so that inboard
         becomes outboard. The order of their subhinges and their axes are reversed: coordinates, velocities, limits, forces and rotors keep
-        their values. For balls and free subhinges on the path, quaternions and positions are inverted, and velocities are those of the
+        their values. For balls and free subhinges on the path, quaternions and positions are inverted, and velocities belong to the
         other body, in its axes. All poses, velocities, energies and momenta are the same, to rounding, and so are accelerations in
         `frames.vdot`. A reversed planar hinge is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay, and
         couplings stay on their coordinates.
@@ -283,8 +283,7 @@ class Structure(Locking):
         return impulse_into(trial, np.array([twists[other] for other in trial._names()[0]]).ravel())
 
     def _require_whole(self, way: set[str], body: str) -> None:
-        """Refuse effects that read coordinates one by one: those of reversed hinges change, and those of the free hinge belong to another
-        body."""
+        """Refuse effects that read coordinates one by one: reversed hinges change theirs, the free hinge changes its body."""
         if len(way) < 2:
             return
         sizes = {hinge: self._slices(self._hinge_index(hinge))[1] for hinge in way}

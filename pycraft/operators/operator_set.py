@@ -184,7 +184,8 @@ class OperatorSet(Closed):
         """Return the operators of the free coordinates with others prescribed: ``H_f``, ``D_f``, ``ψ_f``, ...
 
         H keeps the rows of free coordinates, and every letter that contains H follows from that; φ and M are the same, on the same spaces V
-        and F, so that they combine with those of the model and of `prescribed`. Θ is the space of the free coordinates, in their order.
+        and F, so that they combine with the letters of the model and of
+        `prescribed`. Θ is the space of the free coordinates, in their order.
 
         Parameters
         ----------

@@ -72,7 +72,7 @@ class Row:
 
     @property
     def met(self) -> tuple[bool | None, bool | None]:
-        """Whether the goals are met, in C++ and from Python; None without a goal or a peer."""
+        """Return whether the goals are met, in C++ and from Python; None without a goal or a peer."""
         goals, ratios = GOALS[self.call], (self.ratio, self.python_ratio)
         cpp, python = (None if goal is None or ratio is None else ratio >= goal for goal, ratio in zip(goals, ratios, strict=True))
         return cpp, python

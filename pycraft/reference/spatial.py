@@ -29,7 +29,7 @@ def crf(V):
 
 
 def pose(rotation, position):
-    """X, (4, 4): the frame with the given orientation and origin; X maps its coordinates to those of the reference."""
+    """X, (4, 4): the frame with the given orientation and origin; X maps its coordinates to coordinates of the reference."""
     return np.block([[np.asarray(rotation), np.reshape(position, (3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
 
 

@@ -75,7 +75,7 @@ def says(tmp_path):
         (A + "limits = [-1, nan]",
          ":3: body 'a': limits = [-1, nan]; write [lower, upper], or [[lower, ...], [upper, ...]] with one of each "
          "a subhinge; -inf and inf are no limit"),
-        (A + "[state.q]\na = nan", ":4: q of the state: a = nan; write a finite number, that of the hinge's coordinate"),
+        (A + "[state.q]\na = nan", ":4: q of the state: a = nan; write a finite number, the value of the hinge's coordinate"),
         (A + 'hinge = "ball"\n[state.v]\na = [0, 0]', ":5: v of the state: a = [0, 0]; write 3 finite numbers, those of a ball hinge"),
         (A + "[left_aside]\ndamping = 1", ":4: damping in left_aside is a table, not 1"),
         # what does not go together

@@ -37,7 +37,7 @@ def load(
     The root element of an XML file determines its format. A TOML file holds a model as `Multibody.save` wrote it, including gravity and
     state. From the other formats hinges take the file's joint names, bodies its link names, and the model the robot's name. Children are in
     the order of their joint elements, depth first. Gravity is zero until it is set, even if the file gives it. Damping, friction, springs,
-    actuators and bounds on efforts and velocities are effects: a warning names those of the file, and `pycraft.effects.from_model` makes
+    actuators and bounds on efforts and velocities are effects: a warning names the file's, and `pycraft.effects.from_model` makes
     effects of them. `Multibody.not_read` names elements that change motions elsewhere and are not read, such as contacts.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Robots by name: those of the package, and those of installed packages of robot descriptions."""
+"""Robots by name, from the package and from installed packages of robot descriptions."""
 
 from __future__ import annotations
 

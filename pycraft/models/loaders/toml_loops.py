@@ -72,13 +72,13 @@ def add_loop(model: Multibody, table: TomlTable, rotation: Any, position: Any) -
 def _parts(table: TomlTable, kind: str) -> dict[str, Any]:
     """Return the arguments of the table's kind, except a hinge's placement."""
     if kind == "coupling":
-        return {"coordinates": _coefficients(table), "constant": table.number("constant", 0.0, "that of the relation")}
+        return {"coordinates": _coefficients(table), "constant": table.number("constant", 0.0, "the constant of the relation")}
     if kind == "surface":
         A = table.vectors("quadratic", 3, "three rows of three finite numbers: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
         return {
             "quadratic": A,
             "linear": table.vector("linear", 3, _VECTOR),
-            "constant": table.number("constant", 0.0, "that of the surface"),
+            "constant": table.number("constant", 0.0, "the constant of the surface"),
         }
     if kind == "curve":
         return {

@@ -289,7 +289,7 @@ def _by_hinge(model: Multibody, table: TomlTable, part_of: str, values: np.ndarr
         count = part.stop - part.start
         one = count == 1 and not isinstance(table.data[name], list)
         wanted = f"{count} finite numbers, those of a {hinge.kind} hinge" if count != 1 else "one finite number"
-        values[part] = table.number(name, 0.0, "that of the hinge's coordinate") if one else table.vector(name, count, wanted)
+        values[part] = table.number(name, 0.0, "the value of the hinge's coordinate") if one else table.vector(name, count, wanted)
     return values
 
 
@@ -316,7 +316,7 @@ def _left_aside(model: Multibody, table: TomlTable) -> dict[str, np.ndarray]:
         for name in given.data:
             if name not in numbers:
                 raise given.error(name, f"{given.label}: no coordinate is called {name!r}; {nearest(name, numbers)}")
-            made[key][numbers[name]] = given.number(name, 0.0, "that of this coordinate", infinite=True)
+            made[key][numbers[name]] = given.number(name, 0.0, "the value of this coordinate", infinite=True)
     return made
 
 

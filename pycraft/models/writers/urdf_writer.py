@@ -178,7 +178,7 @@ class _Links:
             self.carried.append(_unused(f"{body['name']}_at_hinge", self.links) if self.moved[-1].any() else body["name"])
 
     def _root(self) -> tuple[str, str]:
-        """Return the root link's name, and the name of the body or node that it represents; empty for neither."""
+        """Return the root link's name, and the name of the body or node that it represents; both are empty if there is none."""
         bodies, nodes = self.described["bodies"], self.described["nodes"]
         on_base = [body for body in bodies if body["parent"] < 0]
         fixed = [node["name"] for node in nodes if node["body"] < 0 and _is_origin(node)]
