@@ -73,11 +73,11 @@ class Spline:
             spline = None
         if spline is None or not np.isfinite(spline.c).all():
             raise _core.ModelError("a spline's slopes are too large for numbers: its points are too close for their differences")
-        self._s, self._periodic, self._ends = spline, periodic, (float(x[0]), float(x[-1]))
+        self._s, self._periodic, self._kind, self._ends = spline, periodic, ends, (float(x[0]), float(x[-1]))
         self._points = x, y
 
     def __reduce__(self):
-        return partial(Spline, periodic=self._periodic), self._points  # in every protocol, unlike SciPy's own
+        return partial(Spline, periodic=self._periodic, ends=self._kind), self._points  # in every protocol, unlike SciPy's own
 
     def __call__(self, q: np.ndarray) -> tuple[float, list[float], list[list[float]]]:
         """Return (r, gradient, second derivatives) of r = follower - s(driver), in the form of `Multibody.add_coupling`."""

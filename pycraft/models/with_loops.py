@@ -161,6 +161,7 @@ class WithLoops(WithFrames):
         curve: Any,
         parameters: Any = None,
         closed: bool = False,
+        ends: str = "not-a-knot",
         name: str | None = None,
     ) -> Loop:
         """Keep a point on a curve: a bead on a wire, a pin in a bent slot. Two rows, "across 1" and "across 2".
@@ -170,12 +171,17 @@ class WithLoops(WithFrames):
         point : body or node, whose origin is the point
         on : body or node, or None for the base: the curve is given in its frame (m)
         curve : (n, 3), a SciPy piecewise polynomial, or a function
-            Points, with the cubic spline through them, natural or, if closed, periodic; a CubicSpline or PPoly of points (3,); a function
-            of one number that returns a point (3,), which is fitted once, to its rounding, by polynomials. It must not have corners.
+            Points, with the cubic spline through them, with these `ends` or, if closed, periodic; a CubicSpline or PPoly of points (3,); a
+            function of one number that returns a point (3,), which is fitted once, to its rounding, by polynomials. It must not have
+            corners.
         parameters : (n,), ascending
             For points: default: lengths from one to the next. For a function, required: (first, last), the interval.
         closed : bool
             The curve ends where it begins; points then repeat the first one as the last. An open curve continues straight beyond its ends.
+        ends : {"not-a-knot", "natural"}; for an open curve through points
+            "not-a-knot": one cubic through the first two intervals, and one through the last two, as in `pycraft.Spline` and SciPy: for
+            points of a smooth curve at distance h the error is O(h⁴) everywhere. "natural": without second derivatives at the ends, so
+            that curvature does not jump where the curve continues straight; with an error of O(h²) near them.
 
         Rows: with c the nearest place of the curve and n₁, n₂ normals there, n_i·(p - c): |r| is the distance (m). n₂ is the normal of a
         plane curve's plane, and for others it turns about the curve as little as possible. Where a curve crosses itself a point continues
@@ -192,7 +198,7 @@ class WithLoops(WithFrames):
         >>> float(mb.loops["helix"].residual([1, 0, 0, 0, 1.5, 0.0, 0.0]).round(3) @ [1, 0])  # half a metre off, away from the axis
         -0.5
         """
-        return self.loops.add_curve(point, on, curve, parameters, closed, name)
+        return self.loops.add_curve(point, on, curve, parameters, closed, name, ends)
 
     def add_coupling(
         self,
