@@ -14,7 +14,15 @@ ROOT = Path(__file__).parents[2]
 # Files and folders that are not edited yet. Take off what has been edited; the list ends empty.
 NOT_EDITED = [
     "cpp",
-    "pycraft",
+    "pycraft/accuracy",
+    "pycraft/compiled",
+    "pycraft/ensembles",
+    "pycraft/identities",
+    "pycraft/proofs",
+    "pycraft/recursions",
+    "pycraft/scenes",
+    "pycraft/view",
+    "pycraft/viewer",
     "tests/dynamics",
     "tests/ensembles/test_sweeps.py",
     "tests/models",
