@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from making import contents, offline
+from making import contents, layers, offline
 from making.plain_index import plain_index, title_and_sentence
 
 ROOT = Path(__file__).parents[2]
 
 
 def configured():
-    """What conf.py says, as far as it is constants."""
+    """Return the constants that conf.py sets."""
     tree = ast.parse((ROOT / "docs" / "making" / "conf.py").read_text())
     found = {}
     for node in tree.body:
@@ -49,7 +49,7 @@ def test_no_link_is_dead(path):
 
 
 def test_a_page_of_the_site_links_to_pages_of_the_site():
-    """A link that is alive in the repository alone would be dead in the site: what is linked to is listed, too."""
+    """A link that works only in the repository would be dead in the site: linked pages are also listed."""
     listed = set(contents.listed())
     for path in contents.committed():
         for target in contents.links(path):
@@ -105,3 +105,13 @@ def test_the_plain_index_has_every_page_with_its_first_sentence():
     assert title_and_sentence("# A `b`\n\n```\ncode\n```\n\nSee [it](x.md), e.g. this. More.") == ("A b", "See it, e.g. this.")
     with pytest.raises(ValueError, match="without a title"):
         title_and_sentence("no title")
+
+
+@pytest.mark.parametrize("picture", layers.PICTURES)
+def test_the_pictures_of_the_layers_are_current(picture):
+    uses = layers.order(layers.PICTURES[picture])
+    drawn = (layers.FOLDER / picture).read_text(encoding="utf-8")
+    assert drawn == layers.svg(uses), "run PYTHONPATH=docs python -m making.layers"
+    assert all(f">{layers.shown(name)}</text>" in drawn for name in uses) and len(uses) > 15
+    height = layers.heights(uses)
+    assert all(height[name] > height[used] for name in uses for used in uses[name])
