@@ -69,8 +69,8 @@ class TreeElimination {
   // scalar may decide.
   template <class Blocks, class Values>
   bool factor(Blocks&& blocks, Values&& values, S tolerated = most_lost());
-  // A recorded one cannot be done in another way: states where it loses more, or nearly as much, run by themselves.
-  static S most_lost() { return is_recorded<S> ? S(S(1e6) * epsilon<S>()) : std::min(S(S(1e7) * epsilon<S>()), S(1e-2)); }
+  // A recorded one cannot be done in another way: states where it loses more, or in packs nearly as much, run by themselves.
+  static S most_lost() { return is_recorded<S> && !elimination::for_source() ? S(S(1e6) * epsilon<S>()) : std::min(S(S(1e7) * epsilon<S>()), S(1e-2)); }
 
   // y = operator x, m columns, with one step of refinement or more. residual(x, s, r): r = b(x) - A s in a wider scalar.
   template <class T, class Blocks>
