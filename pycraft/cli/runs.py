@@ -48,7 +48,7 @@ def run(
     duration: Annotated[
         float | None, typer.Option("-T", "--duration", help="Seconds to simulate; what a scene's file says if left out.")
     ] = None,
-    integrator: Annotated[str | None, typer.Option(help="dopri5 if neither this nor the scene's file says.")] = None,
+    integrator: Annotated[str | None, typer.Option(help="auto if neither this nor the scene's file says.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of a step.")] = None,
     step: Annotated[float | None, typer.Option(help="Seconds, of integrators with steps of one size.")] = None,
