@@ -57,7 +57,7 @@ def test_what_cannot_be_linked_is_refused(tmp_path):
         pc.constant([[1.0]], pc.euclidean(1), pc.euclidean(1), "C").blocks().on_robot()
     with pytest.raises(pc.EvaluationError, match="no body, hinge or node"):
         TREE.soa.velocity.blocks().on_robot()
-    with pytest.raises(pc.EvaluationError, match=r"61 × 61 blocks: 60 a row at most"):
+    with pytest.raises(pc.EvaluationError, match=r"61 × 61 blocks: at most 60 per row"):
         pc.chain(61).soa.MM.blocks().on_robot()
     with pytest.raises(pc.EvaluationError, match="ends in .html"):
         TREE.soa.phi.blocks().on_robot().save(tmp_path / "blocks.png")
