@@ -1,8 +1,8 @@
 """Diagonal blocks of words, from the shapes of their letters.
 
 The block rows and columns of a letter determine where it leads on the tree: E_φ, E_ψ and K from a body to its children, φ and ψ to all
-outboard bodies and the body itself (with I there), their transposes back. This determines the diagonal blocks of a word without evaluation: all
-of the word, if it leads from every body only to itself, as ERE* does; zero, if it never leads back, as φ̃R; the word without φ and ψ, if
+outboard bodies and the body itself (with I there), their transposes back. This determines the diagonal blocks of a word without evaluation:
+all of the word, if it leads from every body only to itself, as ERE* does; zero, if it never leads back, as φ̃R; the word without φ and ψ, if
 only these lead to other bodies.
 """
 

@@ -132,7 +132,7 @@ def test_refusals():
         track().play(np.ones(6), pc.chain(5))
     with pytest.raises(pc.ModelError, match="not a serial chain of 6 bodies"):
         track().play(np.ones(6), pc.tree([-1, 0, 0, 1, 1, 2], ["pin"] * 6))
-    with pytest.raises(pc.ModelError, match="a Multibody, not 'arm'"):
+    with pytest.raises(pc.ModelError, match="must be a Multibody, not 'arm'"):
         track().play(np.ones(6), "arm")
     with pytest.raises(pc.ModelError, match=r"one value per coordinate.*\(6,\)"):
         track().play(np.ones(6), tau=[1.0])

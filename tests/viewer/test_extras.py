@@ -72,7 +72,7 @@ def test_shapes_are_triangles(view, kind, size):
         (lambda v: v.line("l", [1, 2, 3]), r"points takes finite values in m of shape \(n, 3\)"),
         (lambda v: v.label("t", (0, 0, 0), colour="red"), "colour must be '#rrggbb'"),
         (lambda v: v.shape("s", "cone", 1), "unknown shape 'cone'; choose from box"),
-        (lambda v: v.shape("s", "box", 1), "the size of a box is lengths of its edges: 3 numbers"),
+        (lambda v: v.shape("s", "box", 1), "the size of a box is lengths of its edges: 3 positive values"),
         (lambda v: v.shape("s", "sphere", -1), "positive values"),
         (lambda v: v.shape("s", "mesh", (1, 1, 1), file="nowhere.stl"), "nowhere.stl"),
     ],

@@ -136,7 +136,7 @@ def test_refusals(view):
     taken = view._server.server_address[1]
     for options, words in (
         ({"port": taken}, f"port {taken}: .*port=0 picks a free port"),
-        ({"port": 70000}, "port=70000: from 1 to 65535"),
+        ({"port": 70000}, "port=70000: give a port from 1 to 65535"),
         ({"host": "256.0.0.1"}, "cannot use 256.0.0.1"),
     ):
         with pytest.raises(pc.EvaluationError, match=words):
