@@ -99,7 +99,7 @@ def given_place(live: LiveScene, body: Any, place: Any, to: Any) -> tuple[str, n
     places = [np.asarray(_core.real_array(x, what)) for x, what in ((place, "place"), (to, "to"))]
     for x, what in zip(places, ("place", "to"), strict=True):
         if x.shape != (3,) or not np.isfinite(x).all():
-            raise _core.ModelError(f"{what}must be three finite numbers in m, not {x.tolist()!r:.80}")
+            raise _core.ModelError(f"{what} must be three finite numbers in m, not {x.tolist()!r:.80}")
     return str(body), places[0], places[1]
 
 

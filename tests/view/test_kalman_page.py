@@ -124,7 +124,7 @@ def test_the_drawn_row_is_chosen(browser, page, tmp_path):
 
 
 def test_refusals():
-    with pytest.raises(pc.EvaluationError, match="61 time steps: 60 at most"):
+    with pytest.raises(pc.EvaluationError, match="61 time steps: at most 60"):
         track(61).play(np.ones(61))
     with pytest.raises(pc.ModelError, match="no measurements"):
         track().play()

@@ -292,7 +292,7 @@ def test_refusals(session):
         ("parameter", {"effect": "damping", "field": "hinges", "value": 1.0}, "no numeric parameter 'hinges'"),
         ("parameter", {"effect": "damping", "field": "coefficient", "value": [1.0, 2.0]}, "shape"),
         ("parameter", {"effect": "damping", "field": "coefficient", "value": float("nan")}, "finite"),
-        ("ghost", {"name": "of Banquo"}, "no ghost 'of Banquo'"),
+        ("ghost", {"name": "of Banquo"}, "no ghost is called 'of Banquo'"),
     ):
         before = one.live.q.copy(), scene.effects["damping"].coefficient
         with pytest.raises((pc.ModelError, pc.EvaluationError), match=words):
