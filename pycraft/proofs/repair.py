@@ -75,7 +75,7 @@ class Repairs:
     was_true: str = ""
     """Hypotheses under which the typed formula itself is true, in words."""
     ended: str = ""
-    """What was left untried when the budget ended the search; empty if nothing."""
+    """Changes left untried when the budget ended the search; empty if none."""
 
     def __len__(self) -> int:
         return len(self.found)

@@ -207,7 +207,7 @@ def inverted(letter: str) -> bool:
 
 
 class Alphabet:
-    """The letters of one problem: those of the table, and what a statement adds."""
+    """The letters of one problem: letters of the table, and letters that a statement adds."""
 
     def __init__(self, letters: Mapping[str, Letter] | None = None):
         self.letters: dict[str, Letter] = dict(_sko() if letters is None else letters)
