@@ -22,7 +22,7 @@ from .inverse_on_loops import ConstrainedInverseCalls
 from .quadratic import QuadraticCalls
 from .statics import StaticsCalls
 from .statistical import StatisticalCalls
-from .stiff_motion import TAKE, TAKE_DOUBLE, stiffness_text
+from .stiff_motion import SHORTER, TAKE, TAKE_DOUBLE, stiffness_text
 from .task_space import TaskSpaceCalls
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class IntegrationCalls(
         )  # fmt: skip
 
     def _stiff(self, integrator: str, precision: Any, found: Mapping[str, Any]) -> None:
-        remedy = TAKE if precision == "double" else TAKE_DOUBLE
+        remedy = SHORTER if found["longest"] else TAKE if precision == "double" else TAKE_DOUBLE
         self._say(stiffness_text(f"the motion of {self.name!r}", integrator, found, remedy))
 
     def _trajectory(

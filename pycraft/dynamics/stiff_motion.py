@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 TAKE = "Take integrator='rosenbrock4', or 'auto', which takes it where the motion is stiff"
+SHORTER = "Take a shorter step, or integrator='rosenbrock4'"
 TAKE_DOUBLE = "Take integrator='rosenbrock4' in precision='double', or a softer law"
 
 
@@ -15,10 +16,17 @@ def stiffness_text(of: str, integrator: str, found: Mapping[str, Any], remedy: s
     Parameters
     ----------
     of : what is stiff, as "the scene of 'arm'"
-    found : of the core: t and step (s), left (steps of that size to the end), rate (1/s, negative; 0 where only the stages of the method's
-        steps show it), the effect whose forces decay so fast and the coordinate that they act on ("" where not known)
+    found : of the core: t and step (s), left (steps of that size to the end), rate (1/s, negative; 0 where only the stages of the
+        method's steps show it), the effect whose forces change so fast and the coordinate that they act on ("" where not known); longest
+        (s; of steps of one size, which are unstable beyond it, else 0)
     remedy : a sentence
     """
+    if found["longest"]:
+        of_it = f", of coordinate '{found['coordinate']}'" + (f" under effect '{found['effect']}'" if found["effect"] else "")
+        return (
+            f"steps of {found['step']:.2g} s by {integrator!r} are unstable for {of} at t = {found['t']:.3g} s: an oscillation from "
+            f"step to step grows{of_it}. There steps shorter than {found['longest']:.2g} s are stable. {remedy}"
+        )
     what = "the motion decays faster than that"
     if found["rate"]:
         by = f"effect '{found['effect']}' damps" if found["effect"] else "the equations damp"

@@ -25,10 +25,15 @@ class Curve(NamedTuple):
     closed: bool
 
 
-def curve_of(given: Any, parameters: Any, closed: Any, what: str) -> Curve:
+def curve_of(given: Any, parameters: Any, closed: Any, what: str, ends: Any = "not-a-knot") -> Curve:
     """The curve through points, of a piecewise polynomial of SciPy's, or of a function: see `Multibody.add_curve`."""
     if not isinstance(closed, (bool, np.bool_)):
         raise _core.ModelError(f"{what}: closed is True or False, not {closed!r}")
+    if ends not in ("not-a-knot", "natural"):
+        raise _core.ModelError(f"{what}: the ends of a curve through points are 'not-a-knot' or 'natural', not {ends!r:.80}")
+    if ends != "not-a-knot" and (closed or callable(given)):
+        kind = "a closed curve has no ends" if closed else "a function and a piecewise polynomial have ends of their own"
+        raise _core.ModelError(f"{what}: {kind}; leave out ends={ends!r}")
     s = None if parameters is None else np.array(_core.real_array(parameters, f"parameters of {what}"))
     if s is not None and (s.ndim != 1 or len(s) < 2 or not np.isfinite(s).all() or not (np.diff(s) > 0).all()):
         raise _core.ModelError(f"{what}: parameters are two numbers at least, finite, and ascend")
@@ -41,7 +46,7 @@ def curve_of(given: Any, parameters: Any, closed: Any, what: str) -> Curve:
             raise _core.ModelError(f"{what}: beside a function give parameters=(first, last), between which it is the curve")
         found = _fitted(given, s, what)
     else:
-        found = _through(given, s, bool(closed), what)
+        found = _through(given, s, "periodic" if closed else ends, what)
     return checked(Curve(*found, bool(closed)), what)
 
 
@@ -100,9 +105,10 @@ def with_normals(curve: Curve, what: str) -> np.ndarray:
 
 
 # ---------------------------------------------------------------------- what a user gives
-def _through(given: Any, s: np.ndarray | None, closed: bool, what: str) -> tuple[np.ndarray, np.ndarray]:
+def _through(given: Any, s: np.ndarray | None, ends: str, what: str) -> tuple[np.ndarray, np.ndarray]:
     from scipy.interpolate import CubicSpline
 
+    closed = ends == "periodic"
     points = np.array(_core.real_array(given, f"points of {what}"))
     least = 4 if closed else 2
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < least:
@@ -122,7 +128,7 @@ def _through(given: Any, s: np.ndarray | None, closed: bool, what: str) -> tuple
         raise _core.ModelError(f"{what}: {len(points)} points have as many parameters, not {len(s)}")
     try:
         with np.errstate(all="ignore"):
-            return _in_u(s, CubicSpline(s, points, bc_type="periodic" if closed else "natural").c)
+            return _in_u(s, CubicSpline(s, points, bc_type=ends).c)
     except ValueError:  # of slopes that are not finite
         raise _core.ModelError(
             f"{what}: its curve has slopes too large for numbers; points are too far apart, or parameters too close"

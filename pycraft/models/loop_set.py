@@ -281,11 +281,11 @@ class Loops(Closed, Mapping):
         slopes = np.zeros(3) if linear is None else _numbers(linear, f"b {what}")
         return self._declare(declared | {"quadratic": A, "linear": slopes, "constant": one_number(constant, f"c {what}")})
 
-    def add_curve(self, b: Any, a: Any, curve: Any, parameters: Any, closed: Any, name: str | None) -> Loop:
+    def add_curve(self, b: Any, a: Any, curve: Any, parameters: Any, closed: Any, name: str | None, ends: Any = "not-a-knot") -> Loop:
         """A curve for a point: see `Multibody.add_curve`. A `Curve` is taken as it is."""
         declared = self._ends(a, b, name) | {"kind": "curve"}
         what = f"loop {declared['name']!r}"
-        found = checked(curve, what) if isinstance(curve, Curve) else curve_of(curve, parameters, closed, what)
+        found = checked(curve, what) if isinstance(curve, Curve) else curve_of(curve, parameters, closed, what, ends)
         return self._declare(declared | found._asdict())
 
     def add_coupling(self, coordinates: Any, constant: Any, function: Relation | None, name: str | None) -> Loop:

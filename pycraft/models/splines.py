@@ -73,11 +73,11 @@ class Spline:
             spline = None
         if spline is None or not np.isfinite(spline.c).all():
             raise _core.ModelError("a spline's slopes are too large for numbers: its points are too close for what they differ by")
-        self._s, self._periodic, self._ends = spline, periodic, (float(x[0]), float(x[-1]))
+        self._s, self._periodic, self._kind, self._ends = spline, periodic, ends, (float(x[0]), float(x[-1]))
         self._points = x, y
 
     def __reduce__(self):
-        return partial(Spline, periodic=self._periodic), self._points  # in every protocol, as SciPy's own is not
+        return partial(Spline, periodic=self._periodic, ends=self._kind), self._points  # in every protocol, as SciPy's own is not
 
     def __call__(self, q: np.ndarray) -> tuple[float, list[float], list[list[float]]]:
         """(r, gradient, second derivatives) of r = follower - s(driver), as `Multibody.add_coupling` wants them."""

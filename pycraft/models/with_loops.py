@@ -161,6 +161,7 @@ class WithLoops(WithFrames):
         curve: Any,
         parameters: Any = None,
         closed: bool = False,
+        ends: str = "not-a-knot",
         name: str | None = None,
     ) -> Loop:
         """A point stays on a curve: a bead on a wire, a pin in a bent slot. Two rows, "across 1" and "across 2".
@@ -170,12 +171,16 @@ class WithLoops(WithFrames):
         point : body or node, whose origin it is
         on : body or node, or None for the base: the curve is given in its frame (m)
         curve : (n, 3), a piecewise polynomial of SciPy's, or a function
-            Points, with the cubic spline through them, natural or, closed, periodic; a CubicSpline or PPoly of points (3,); a function
-            of one number that returns a point (3,), which is fitted once, to its rounding, by polynomials. It has no corners.
+            Points, with the cubic spline through them, of these `ends` or, closed, periodic; a CubicSpline or PPoly of points (3,); a
+            function of one number that returns a point (3,), which is fitted once, to its rounding, by polynomials. It has no corners.
         parameters : (n,), ascending
             Of points: lengths from one to the next by default. Of a function, which needs them: (first, last), and what is between.
         closed : bool
             The curve ends where it begins, of points with the first one again as the last. An open one goes on straight beyond its ends.
+        ends : {"not-a-knot", "natural"}; of an open curve through points
+            "not-a-knot": one cubic through the first two intervals, and one through the last two, as `pycraft.Spline` and SciPy have it:
+            of points of a smooth curve at distance h it is off by O(h⁴) everywhere. "natural": without second derivatives at the ends,
+            so that curvature does not jump where it goes on straight; off by O(h²) near them.
 
         Rows: with c the nearest place of the curve and n₁, n₂ normals there, n_i·(p - c): |r| is the distance (m). n₂ is the normal of a
         plane curve's plane, and of others turns about the curve as little as may be. Where a curve crosses itself a point goes on along
@@ -192,7 +197,7 @@ class WithLoops(WithFrames):
         >>> float(mb.loops["helix"].residual([1, 0, 0, 0, 1.5, 0.0, 0.0]).round(3) @ [1, 0])  # half a metre off, away from the axis
         -0.5
         """
-        return self.loops.add_curve(point, on, curve, parameters, closed, name)
+        return self.loops.add_curve(point, on, curve, parameters, closed, name, ends)
 
     def add_coupling(
         self,
