@@ -19,7 +19,7 @@ runner = CliRunner()
 
 @pytest.fixture
 def shown(monkeypatch):
-    """What would be waited for."""
+    """The event that the command would wait for."""
     seen = []
     monkeypatch.setattr(View, "wait", lambda view: seen.append((view, view.session.setup(), view.session.live.q.tolist())))
     monkeypatch.setattr("webbrowser.open", lambda address: seen.append(address))

@@ -158,7 +158,7 @@ def test_edits_do_not_show():
     before = model.mass_matrix([0.1, 0.2])
     model.bodies["body1"].mass = 7.0
     np.testing.assert_allclose(compiled(np.array([0.1, 0.2])), before, rtol=1e-14)
-    np.testing.assert_allclose(compiled([0.1, 0.2]), before, rtol=1e-14)  # the ordinary way, too
+    np.testing.assert_allclose(compiled([0.1, 0.2]), before, rtol=1e-14)  # also by the ordinary call
     assert not np.allclose(model.mass_matrix([0.1, 0.2]), before)
 
 

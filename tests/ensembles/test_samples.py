@@ -63,7 +63,7 @@ def test_two_together():
         (lambda: Samples({}), "samples must map names to values"),
         (lambda: Samples({"a": [1], "b": [1, 2]}), "every name needs the same number of values; got 1 of a, 2 of b"),
         (lambda: Samples({"a": []}), "samples of 'a': at least one value is needed"),
-        (lambda: Samples({"a": 3}), "samples of 'a': a list, not 3"),
+        (lambda: Samples({"a": 3}), "samples of 'a' must be a list, not 3"),
         (lambda: pc.samples.random(0, {"a": (0, 1)}), "count=0: at least one sample is needed"),
         (
             lambda: pc.samples.random(3, {"a": (1, 0)}),

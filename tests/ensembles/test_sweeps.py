@@ -64,7 +64,7 @@ def test_a_function(scene):
 
 
 def test_statements_over_many_models():
-    """What holds of every model and what does not, on processes."""
+    """Statements that hold on every model and statements that do not, on processes."""
     models = [pc.chain(2), pc.robots.panda(), pc.tree([-1, 0, 0, 1], seed=3)]
     for statement, holds in (("inv(psi) == inv(phi) + K*H", True), ("psi == phi", False)):
         found = pc.sweep(sweeps.check_statement, {"model": models, "statement": [statement] * 3}, on="processes", workers=1, progress=False)
@@ -103,7 +103,7 @@ def test_ctrl_c_keeps_what_is_finished():
 
 @pytest.mark.parametrize("kill, failed", [(sweeps.die_once, []), (sweeps.die_always, [3])])
 def test_a_process_that_dies(tmp_path, kill, failed):
-    """What it had is run again; the sample that kills its process each time is a failure, and the only one."""
+    """Its runs are repeated; the sample that kills its process each time is a failure, and the only one."""
     samples = {"x": list(range(12))} | ({"folder": [str(tmp_path)] * 12} if kill is sweeps.die_once else {})
     found = pc.sweep(kill, samples, on="processes", workers=2, progress=False)
     assert found.finished.all() and [failure.sample for failure in found.failures] == failed

@@ -1,4 +1,4 @@
-"""Letters beyond the table of operators: definitions around a statement, those of the equations of motion, rates, nodes, determinants."""
+"""Letters beyond the table of operators: definitions around a statement, letters of the equations of motion, rates, nodes, determinants."""
 
 from pathlib import Path
 

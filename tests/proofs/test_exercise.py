@@ -187,7 +187,7 @@ def test_what_is_false_on_deep_trees_alone_is_refuted():
 
 
 def test_numbers_alone_are_never_enough():
-    """On one body every line of this is true in numbers: K = 0 there. It is the axioms that must say so."""
+    """On one body every line of this is numerically true: K = 0 there. The axioms must decide."""
     one = pc.chain(1)
     task = exercise("[I+HφK]⁻¹ = I - HψK", one, 1)
     judgement = task.answer("I - HφK")

@@ -1,4 +1,4 @@
-"""What may be assumed and defined in a proof, and statements of compliances, diagonal blocks, nodes and roots."""
+"""Assumptions and definitions in a proof, and statements about compliances, diagonal blocks, nodes and roots."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What proofs rest on: axioms that hold in numbers, lemmas proved from what stands above them, rules whose overlaps all resolve."""
+"""Foundations of proofs: axioms that hold numerically, lemmas proved from earlier ones, rules whose overlaps all resolve."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What `prove` takes and gives: inverses of sums, diagonal parts, roots, vectors, states, large models; how proofs are shown."""
+"""Inputs and results of `prove`: inverses of sums, diagonal parts, roots, vectors, states, large models; how proofs are shown."""
 
 import functools
 import operator
@@ -85,7 +85,7 @@ def test_diagonal_parts_and_roots(arm):
 
 @pytest.mark.parametrize("model", [tree(3), meeting([CHAIN], 2)], ids=["tree", "chain"])
 def test_diagonal_parts_of_words_are_those_of_numbers(model):
-    """What the letters say of a word's diagonal blocks, against NumPy."""
+    """Diagonal blocks of a word as implied by its letters, against NumPy."""
     model.q = model.random_state(1).q
     alphabet, spaces = Alphabet(), {"F": model.soa.F, "V": model.soa.V, "Θ": model.soa.Theta}
     values, known = Values(alphabet, model.soa), 0

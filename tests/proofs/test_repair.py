@@ -149,7 +149,7 @@ TEXTS = [
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_formula_is_what_the_statement_is(text):
-    """Read as a tree, written, read as a statement: the same values; and the dense value is that of the expression."""
+    """Read as a tree, written, read as a statement: the same values; and the dense value equals the expression's."""
     model, dense = letters()
     formula = read_formula(text)
     typed, again = Statements(model.soa).read(text), Statements(model.soa).read(written_statement(formula))

@@ -29,7 +29,7 @@ def page():
 
 
 def told(page):
-    """What the page's script is given."""
+    """Return the data of the page's script."""
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
 
 
@@ -106,7 +106,7 @@ def test_all_of_several_measurements_are_told():
     assert page.filter_steps[1].value.shape == (2, 2)
     data, f, s = told(page), page.track.filter(), page.track.smooth()
     assert data["measured"] == [[1, 2, None, 4], [8, None, 6, 5]]
-    np.testing.assert_allclose(data["predicted"], [[1, 0], [1, 2]] @ f.predicted.T, rtol=1e-5, atol=1e-9)  # six digits are told
+    np.testing.assert_allclose(data["predicted"], [[1, 0], [1, 2]] @ f.predicted.T, rtol=1e-5, atol=1e-9)  # the page has six digits
     np.testing.assert_allclose(data["smoothed"], [[1, 0], [1, 2]] @ s.states.T, rtol=1e-5)
     np.testing.assert_allclose(np.array(data["deviation"], float) ** 2, f.innovation_covariance[:, [0, 1], [0, 1]].T, rtol=1e-4)
 

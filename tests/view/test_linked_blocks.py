@@ -65,7 +65,7 @@ def test_what_cannot_be_linked_is_refused(tmp_path):
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_pointing_at_a_block_lights_its_path(browser, tmp_path, dark):
-    target = TREE.soa.MM.inv().blocks().on_robot("tree").save(tmp_path / "blocks.html")  # between siblings, too
+    target = TREE.soa.MM.inv().blocks().on_robot("tree").save(tmp_path / "blocks.html")  # also between siblings
     parents = list(TREE.soa._source.parents)
     leaves = [k for k in range(4) if k not in parents]
     with opened(browser, target.as_uri(), dark=dark) as page:

@@ -54,7 +54,7 @@ def test_what_is_alone_has_all_of_its_directions():
     light = pc.Multibody("light on heavy")
     light.add_body("heavy", hinge="slider", axis=(1, 0, 0), mass=1e9, inertia=np.eye(3))
     light.add_body("light", parent="heavy", hinge="slider", axis=(1, 0, 0), mass=1.0, inertia=np.eye(3))
-    # Together they are the number of coordinates; the light one moves as if the other stood still, but for the ratio of masses, 1e-9.
+    # Together they are the number of coordinates; the light one moves as if the other were at rest, up to the ratio of masses, 1e-9.
     assert light.dof_shares().values == pytest.approx([1, 1], abs=1e-8)
 
 

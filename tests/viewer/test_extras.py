@@ -1,4 +1,4 @@
-"""What code shows in the viewer: places are those that were given, names replace, and what cannot be shown is refused."""
+"""Objects that code shows in the viewer: places are as given, names replace, and invalid objects are refused."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ def test_shapes_are_triangles(view, kind, size):
         (lambda v: v.frame("f", [1, 2, np.nan]), "must be a finite array"),
         (lambda v: v.frame("f", (0, 0, 0), on="moon"), "no body or node 'moon'"),
         (lambda v: v.frame("f", (0, 0, 0), size=-1), "size must be a positive length in m"),
-        (lambda v: v.frame(7, (0, 0, 0)), "called by a text"),
+        (lambda v: v.frame(7, (0, 0, 0)), "named by a string"),
         (lambda v: v.label("t", (0, 0)), r"at takes finite values in m of shape \(3,\)"),
         (lambda v: v.line("l", [1, 2, 3]), r"points takes finite values in m of shape \(n, 3\)"),
         (lambda v: v.label("t", (0, 0, 0), colour="red"), "colour must be '#rrggbb'"),
