@@ -1,4 +1,4 @@
-"""What is said of a motion whose steps are held by stability, not by accuracy."""
+"""Warnings for motion with steps limited by stability, not by accuracy."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ TAKE_DOUBLE = "Take integrator='rosenbrock4' in precision='double', or a softer 
 
 
 def stiffness_text(of: str, integrator: str, found: Mapping[str, Any], remedy: str) -> str:
-    """The text of a warning.
+    """Return the text of a warning.
 
     Parameters
     ----------
-    of : what is stiff, as "the scene of 'arm'"
-    found : of the core: t and step (s), left (steps of that size to the end), rate (1/s, negative; 0 where only the stages of the
-        method's steps show it), the effect whose forces change so fast and the coordinate that they act on ("" where not known); longest
-        (s; of steps of one size, which are unstable beyond it, else 0)
+    of : the stiff system, as "the scene of 'arm'"
+    found : from the core: t and step (s), left (steps of that size to the end), rate (1/s, negative; 0 if only the stages of the method's
+        steps show it), the effect with forces that change so fast and the coordinate on which they act ("" if unknown); longest (s; for
+        constant steps, which are unstable beyond it, else 0)
     remedy : a sentence
     """
     if found["longest"]:
@@ -33,5 +33,5 @@ def stiffness_text(of: str, integrator: str, found: Mapping[str, Any], remedy: s
         what = f"{by} coordinate '{found['coordinate']}' at a rate of {-found['rate']:.2g} /s"
     return (
         f"{of} is stiff: integrator {integrator!r} takes steps of {found['step']:.2g} s at t = {found['t']:.3g} s, "
-        f"which stability holds and not accuracy, {found['left']:.2g} of them to the end; {what}. {remedy}"
+        f"limited by stability and not by accuracy, {found['left']:.2g} of them to the end; {what}. {remedy}"
     )

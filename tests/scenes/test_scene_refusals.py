@@ -1,4 +1,4 @@
-"""What a scene says of names that are not there and of numbers and calls that make no sense: each with its text."""
+"""Errors of a scene for unknown names and for invalid values and calls: each with its text."""
 
 import numpy as np
 import pytest
@@ -53,8 +53,8 @@ WRONG = [
     (lambda: E.Damping(np.nan), "damping: coefficient has an entry that is nan"),
     (lambda: E.Damping("0.1"), "damping: coefficient is not an array of numbers"),
     (lambda: E.Damping({"wrist": 1.0}, hinges="wrist"), "damping: coefficient names its hinges itself; leave out hinges="),
-    (lambda: E.Damping(0.1, hinges=3), "damping: hinges: a list, not 3"),
-    (lambda: E.Damping(0.1, hinges=[3]), "damping: one of its hinges is called by a text, not by 3"),
+    (lambda: E.Damping(0.1, hinges=3), "damping: hinges must be a list, not 3"),
+    (lambda: E.Damping(0.1, hinges=[3]), "damping: one of its hinges is named by a string, not by 3"),
     (lambda: E.Gravity((0, 0)), "gravity: g takes 3 numbers"),
     (lambda: E.Gravity((0, 0, np.inf)), "gravity: g has an entry that is inf"),
     (lambda: E.CoulombFriction(-1.0), "coulomb_friction: level is -1; it is not negative"),
