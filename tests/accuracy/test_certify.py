@@ -163,7 +163,7 @@ def test_a_coordinate_that_is_zero_moves_by_half_an_epsilon_of_a_radian(panda):
 
 
 def test_forces_that_cancel_are_data_too():
-    """The stretched chain: half a unit of the forces makes more than the error, and the certificate says so."""
+    """The stretched chain: half a unit of the forces makes more than the error, and the certificate reports it."""
     rods = pc.chain(200)
     tau = rods.mass_matrix(np.zeros(200))[:, 0]
     certificate = certify_dynamics(rods, np.zeros(200), tau=tau, seconds=0)

@@ -222,7 +222,7 @@ def never(t, state):
         (lambda scene: scene.add(push), {}, "effect 'push' is written in Python"),
         (lambda scene: scene.add(E.TorqueSource(lambda t: 0.1 * t, hinges="boom")), {}, "effect 'torque_source' is written in Python"),
         (lambda scene: scene.add(E.Prescribed("boom", lambda t: (0.1 * t, 0.1, 0.0))), {}, "effect 'prescribed' is written in Python"),
-        (lambda scene: scene, {"events": never}, "events are looked for"),
+        (lambda scene: scene, {"events": never}, "the runs look for events"),
         (lambda scene: scene, {"integrator": "scipy:RK45"}, "integrator 'scipy:RK45' is another package's"),
         (lambda scene: scene, {"integrator": "variational2", "step": 0.01}, "integrator 'variational2' solves for momenta"),
         (lambda scene: pc.Scene(scene.model, precision="extended").add(E.Gravity()), {}, "packs are of states in double precision"),
@@ -242,8 +242,8 @@ def test_what_declines_says_why_and_runs_one_by_one(change, options, why):
 def test_models_that_differ_decline():
     scene = scene_of("gravity and damping")
     found = pc.sweep(scene, {"bodies.arm.mass": [0.5, 0.6]}, 0.05, rtol=1e-4, progress=False)
-    assert found.explain() == "2 runs, one by one: samples set 'bodies.arm.mass', and packs are of one model"
-    assert pc.sweep(lambda x: x, {"x": [1.0]}, progress=False).explain() == "1 runs, one by one: they are calls of a function"
+    assert found.explain() == "2 runs, one by one: samples set 'bodies.arm.mass', and a pack shares one model"
+    assert pc.sweep(lambda x: x, {"x": [1.0]}, progress=False).explain() == "1 runs, one by one: they call a function"
 
 
 @pytest.mark.parametrize("how", [{"form": "ud"}, {"form": "square-root"}, {"refine": 1}])

@@ -1,4 +1,4 @@
-"""What users give to models: setters check as constructors do. A part of `campaigns.arguments` runs here."""
+"""User input of models: setters check as constructors do. A part of `campaigns.arguments` runs here."""
 
 import numpy as np
 import pytest
@@ -247,7 +247,7 @@ def test_two_coordinates_never_have_one_name():
 
 
 class Outside:
-    """A linear operator as SciPy has them, whose product is what it is told to be."""
+    """A linear operator as SciPy has them, with a given product."""
 
     def __init__(self, result):
         self.result, self.shape, self.dtype = result, (3, 3), np.dtype(float)

@@ -82,7 +82,7 @@ def test_what_is_near_is_found_and_what_is_around_no_loop_stays():
     state = model.assemble(q0)
     assert np.abs(state.q[order] - exact).max() < 0.05 and np.abs(model.loops.residual(state)).max() < 20 * EPS
     turned = state.q[model.hinges["bystander"].q_slice]
-    assert np.abs(turned - rest).max() < 4 * EPS  # moved by nothing, but for the rounding of a product
+    assert np.abs(turned - rest).max() < 4 * EPS  # not moved, up to the rounding of a product
     assert np.array_equal(model.q, before)
     again = model.assemble(state)
     assert np.abs(again.q - state.q).max() < 4 * EPS

@@ -120,7 +120,7 @@ def test_only_loose_frames_are_edited(arm):
 
 
 def test_what_a_body_takes_with_it(arm):
-    """A removed body leaves its loose frames standing on nothing: they say so until they are put elsewhere."""
+    """A removed body leaves its loose frames without a carrier: they raise an error until they are attached elsewhere."""
     arm.remove_body("body2")
     for question in (lambda: arm.frame("bit").pose(), lambda: arm.frame("body0").velocity(wrt="tool"), lambda: arm.frame("tool").on):
         words = "frame 'tool' of 'chain of 3 rods' stood on 'body2', which is no longer there: attach it to another frame, or remove it"

@@ -21,7 +21,7 @@ def options_of(integrator):
 
 
 def same_from(whole, rest):
-    """Whether `rest` is the end of `whole`, bit for bit."""
+    """Check that `rest` is the end of `whole`, bit for bit."""
     first = int(np.searchsorted(whole.t, rest.t[0]))
     return all(np.array_equal(getattr(whole, name)[first:], getattr(rest, name)) for name in ("t", "q", "v", "states", "_work"))
 
@@ -95,7 +95,7 @@ def test_from_a_terminal_event():
 
 
 def test_after_an_interrupt_or_an_error():
-    """What was computed goes on as if nothing had happened."""
+    """The computed part is resumed as if nothing had happened."""
     state = {"broken": True}
 
     def brake(t, s):

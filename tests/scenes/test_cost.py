@@ -1,4 +1,4 @@
-"""What a scene costs: the parts of a step, effects that are on and off, and what is refused."""
+"""Cost of a scene: the parts of a step, enabled and disabled effects, and refusals."""
 
 import re
 
@@ -13,7 +13,7 @@ from pycraft.scenes.cost import CostTable
 mpl.use("Agg")
 E = pc.effects
 SECONDS = 0.004
-"""Of each figure: what is asserted of times stands far above what this leaves of noise."""
+"""Seconds for each figure: assertions about times are far above the noise that this leaves."""
 
 
 @pytest.fixture(autouse=True)

@@ -35,7 +35,7 @@ def test_hermites_order(case):
 
 @pytest.mark.parametrize("case", ["double pendulum", "spinning"])
 def test_the_order_of_the_dense_output_of_dop853(case):
-    """It is a polynomial of degree 7 with local errors O(h⁸), as those of the steps add up to."""
+    """It is a polynomial of degree 7 with local errors O(h⁸), like the steps' accumulated errors."""
     found = errors_between(CASES[case](), "dop853", (8, 16, 32) if case == "double pendulum" else (2, 4, 8))
     orders = np.log2(found[:-1] / found[1:])
     assert (orders[-1] > 7).all() and found[-1].max() < 1e-9, (found, orders)

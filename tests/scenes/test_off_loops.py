@@ -1,4 +1,4 @@
-"""A scene that is evaluated off the loops that it keeps says so, and which row; states on them, and loops with gains, say nothing."""
+"""A scene that is evaluated off its kept loops warns and names the row; states on them, and loops with gains, give no warning."""
 
 import warnings
 

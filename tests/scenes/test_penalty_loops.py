@@ -58,7 +58,7 @@ def test_a_row_swings_at_its_frequency(ζ, omega):
 
 
 def test_rotors_and_what_is_prescribed_are_in_it():
-    """Compliance is of what moves: with a rotor on one wheel less, with one wheel driven that of the other alone."""
+    """Compliance is of what moves: less with a rotor on one wheel, and only the other wheel's with one wheel driven."""
     model = two_wheels()
     loop = E.Loop(method="penalty", frequency=30.0, damping_ratio=0.0)
 
@@ -272,7 +272,7 @@ def test_a_held_scene_is_a_tree_with_forces():
 
 
 def test_springs_are_of_the_present_state():
-    """Another q of the model is another compliance; of one scene that was run before, too."""
+    """Another q of the model is another compliance; also in a scene that was run before."""
     model = closed_four_bar()
     scene, off = held(model), model.integrate(model.q, [0.01, 0.0, 0.0])
     before = scene.evaluate(off, np.zeros(3)).forces["loop"]

@@ -13,7 +13,7 @@ FALL = np.sqrt(2 * 9.81)  # m/s, by 1 m
 @pytest.mark.parametrize("e", [1.0, 0.9, 0.5, 0.2])
 @pytest.mark.parametrize(("stiffness", "mass"), [(1e9, 1.0), (1e8, 3.0)])
 def test_balls(e, stiffness, mass):
-    """What falls by 1 m: gravity acts within the stop, too, by g/ωv of the speed."""
+    """A fall of 1 m: gravity also acts within the stop, by g/ωv of the speed."""
     ball = pc.Multibody("ball")
     ball.add_body("b", hinge="slider", axis=(0, 0, 1), mass=mass, limits=(0, np.inf))
     run = pc.Scene(ball).add(E.Gravity(), E.Limits(stiffness, restitution=(e, FALL))).simulate(1.0, [1.0], [0.0], **P)

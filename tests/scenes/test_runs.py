@@ -1,4 +1,4 @@
-"""What a run says: energies, momenta, frames, forces, statistics, progress, and what is left of one that ended early."""
+"""Contents of a run: energies, momenta, frames, forces, statistics, progress, and the rest of a run that ended early."""
 
 import os
 import pickle

@@ -232,7 +232,7 @@ def test_between_rows_at_knots_and_samples(how, tmp_path):
 
 @pytest.mark.parametrize("t_eval", [None, [0.1, 0.9]])
 def test_files_of_the_first_format(t_eval, tmp_path):
-    """They have one acceleration at each row, or none beside those of the table, and do not say what controllers hold."""
+    """They have one acceleration at each row, or none beside the table's, and do not have the held outputs of controllers."""
     from scipy.io import netcdf_file
 
     run = jumping().simulate(0.9, [0.3, 0.2], [0.0, 0.0], t_eval=t_eval)

@@ -51,7 +51,7 @@ def arm():
 
 
 def same_numbers(one, other, seed=1):
-    """Whether two scenes say the same of a state, bit for bit."""
+    """Check that two scenes give the same results at a state, bit for bit."""
     state = one.model.random_state(seed)
     a, b = (scene.evaluate(state.q, state.v, 0.7, step=0.01) for scene in (one, other))
     assert np.array_equal(a.vdot, b.vdot) and a.passes == b.passes and list(a.forces) == list(b.forces)

@@ -1,4 +1,4 @@
-"""Forces of hinges under effects: of scenes and along runs, against those of the model under the same wrenches, and closed forms."""
+"""Forces of hinges under effects: in scenes and along runs, against the model under the same wrenches, and closed forms."""
 
 import pickle
 

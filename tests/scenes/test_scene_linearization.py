@@ -150,7 +150,7 @@ def test_along_no_states():
 
 
 def test_a_run_brings_its_times_and_the_states_of_its_effects():
-    """They were taken for t = 0 and the states at first: another model than that of the motion, and nothing said so."""
+    """They were taken for t = 0 and the states at first: a model that was not the motion's, without an error."""
     model = pc.chain(2)
     push = E.Table([0, 1], [[0] * 6, [0, 0, 9, 3, 2, 0]])
     scene = pc.Scene(model).add(E.Gravity((9.81, 0, 0)), E.Wrench("body1", push), E.NoseHoover(1.0, 0.3))

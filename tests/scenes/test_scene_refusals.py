@@ -1,4 +1,4 @@
-"""What a scene says of names that are not there and of numbers and calls that make no sense: each with its text."""
+"""Errors of a scene for unknown names and for invalid values and calls: each with its text."""
 
 import numpy as np
 import pytest
