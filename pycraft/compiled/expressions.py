@@ -1,6 +1,6 @@
 """Expressions as straight-line code: the tape of the core's own run of the plan (cpp/algebra/engine/taped_plan.h).
 
-What the engine decides by the values of one state becomes a guard: where it does not hold, the expression is evaluated as usual.
+Decisions by value become guards: where a guard fails, the expression is evaluated in the ordinary way.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class ExpressionGraph:
     Attributes
     ----------
     graph, results : the nodes of the result, in its shape
-    arguments : names and widths of what it is a function of: q and v of a model at whose state letters are free, x, named vectors
-    model : that model; None where everything is bound
+    arguments : names and widths of the inputs: q and v of the model whose state is free, x, named vectors
+    model : the model whose state is free; None where everything is bound
     vectors : the names of named vectors
     """
 
@@ -51,7 +51,7 @@ class ExpressionGraph:
                 raise _core.EvaluationError(f"a vector called {name!r} has the name of another argument of what compile() makes; rename it")
 
     def _recorded(self, expression: Any, request: str, most: int) -> Any:
-        """Return the tape at a state near the model's own, or where that one decides as few do, at another."""
+        """Return the tape recorded near the model's own state, or at another where no tape can be recorded there."""
         states = states_to_record(self.model) if self.model is not None else [None]
         for last, state in enumerate(states, 1 - len(states)):
             bound = expression if state is None else expression.at(state.q[None], state.v[None])
@@ -78,7 +78,7 @@ def _is_vector(expression: Any) -> bool:
 
 
 def _free_model(operands: list[Any]) -> Any:
-    """The model whose state letters are free to take; None where all are bound. EvaluationError where there are two."""
+    """Return the model whose state is not bound, None where all are bound. EvaluationError where there are two."""
     models: list[Any] = []
     for source in _core.unbound_sources(operands):
         model = source.model

@@ -1,10 +1,10 @@
-"""Graphs of operations, made shorter: what is on a tape of the core (cpp/lanes/tape.h), before it becomes straight-line code.
+"""Graphs of operations: a tape of the core (cpp/lanes/tape.h) with fewer operations, before it becomes straight-line code.
 
-A node is a constant, an input, or an operation on nodes, known by its number. Operations on constants are carried out, a sum with zero and a
-product with zero or one are left out, and equal operations are one node. A division becomes a product with the reciprocal of the divisor,
+A node is a constant, an input, or an operation on nodes, and is identified by its number. Operations on constants are computed, sums with zero
+and products with zero or one are dropped, and equal operations are one node. A division becomes a product with the reciprocal of the divisor,
 which is computed once and rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one.
 
-Leaving out 0 x is exact for finite x alone; the code that is built of a graph checks that its inputs and results are finite (source.py).
+Dropping 0 x is exact for finite x alone; the code that is built of a graph checks that its inputs and results are finite (source.py).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 
 
 class Graph:
-    """Operations in the order in which they came about, each after those that it takes.
+    """Operations in the order of their making, each after its operands.
 
     Attributes
     ----------
@@ -50,24 +50,24 @@ class Graph:
         return found
 
     def constant_of(self, index: int) -> float | None:
-        """The number of a constant, None of other nodes."""
+        """Return the value of a constant, None for other nodes."""
         operation = self.operations[index]
         return operation[1] if operation[0] == CONSTANT else None
 
     def number(self, x: float) -> int:
-        """The node of a constant."""
+        """Return the node of a constant."""
         return self._node(CONSTANT, float(x) + 0.0)  # no -0
 
     def input(self, array: str, entry: int) -> int:
-        """The node of an entry of an input."""
+        """Return the node of an entry of an input."""
         return self._node(INPUT, array, entry)
 
     def put(self, name: str, *taken: int) -> int:
-        """The node of an operation; an older one where it comes to the same."""
+        """Return the node of an operation, an earlier one where it is equal."""
         folded = getattr(self, "_" + name, None)
         return folded(*taken) if folded else self._function(name, *taken)
 
-    # ------------------------------------------------------------------ what is folded
+    # ------------------------------------------------------------------ folding
     def _function(self, name: str, a: int) -> int:
         x = self.constant_of(a)
         return self._node(name, a) if x is None else self.number(_FUNCTIONS[name](x))
@@ -86,7 +86,7 @@ class Graph:
         return self._node("negate", a)
 
     def _negated(self, a: int) -> int | None:
-        """What a is the negative of, where it is written as one."""
+        """Return b where a is -b, else None."""
         operation = self.operations[a]
         return operation[1] if operation[0] == "negate" else None
 
@@ -109,7 +109,7 @@ class Graph:
         return self._node("add", *sorted((a, b)))
 
     def _are_one(self, a: int, b: int) -> bool:
-        """Whether it is cos x + 2 sin² x/2, which a turn about an axis has along it."""
+        """Check for cos x + 2 sin² x/2, an entry of every rotation about an axis."""
         cosine, product = self.operations[a], self.operations[b]
         if cosine[0] != "cosine" or product[0] != "multiply":
             return False
@@ -202,9 +202,9 @@ class Graph:
             return a if a == b else self._node("choose", truth, a, b)
         return a if known else b
 
-    # ------------------------------------------------------------------ what is used
+    # ------------------------------------------------------------------ use
     def needed(self, results: Iterable[int]) -> list[int]:
-        """The nodes that these come from, in order."""
+        """Return the nodes that the results and guards depend on, in order."""
         seen, waiting = set(), [*results, *self.guards]
         while waiting:
             node = waiting.pop()
@@ -216,5 +216,5 @@ class Graph:
 
 
 def operands(operation: Sequence[Any]) -> tuple[int, ...]:
-    """The nodes that an operation takes."""
+    """Return the operands of an operation."""
     return () if operation[0] in (CONSTANT, INPUT) else tuple(operation[1:])

@@ -30,7 +30,7 @@ def test_a_robot_with_effects(shown):
     result = runner.invoke(app, ["view", "panda", "--effect", "gravity", "--effect", "damping:0.5", "--seed", "3"])
     assert result.exit_code == 0, result.output
     address, (view, setup, q) = shown
-    assert address == view.address and f"panda at {address} (this machine alone); Ctrl-C ends it" in result.output
+    assert address == view.address and f"panda at {address} (this machine only); Ctrl-C ends it" in result.output
     assert [effect["name"] for effect in setup["effects"]] == ["gravity", "damping"]
     assert q == pc.robots.panda().random_state(3).q.tolist() and repr(view).endswith("closed>")
 

@@ -154,7 +154,7 @@ def test_what_does_not_take_them_says_so():
     for call in (pc.truth, pc.repair):
         with pytest.raises(pc.EvaluationError, match="statements by block are not mapped or repaired"):
             call("Ω(i,j) = Υ(i)ψ(i,j), i above j")
-    with pytest.raises(pc.EvaluationError, match="none of operators"):
+    with pytest.raises(pc.EvaluationError, match="without a form in operators"):
         prove("Ω(i,j) = Υ(i)ψ(i,j), i above j")
 
 

@@ -15,26 +15,18 @@ ROOT = Path(__file__).parents[2]
 NOT_EDITED = [
     "cpp",
     "pycraft/accuracy",
-    "pycraft/compiled",
-    "pycraft/ensembles",
     "pycraft/identities",
-    "pycraft/proofs",
-    "pycraft/recursions",
     "pycraft/scenes",
-    "pycraft/view",
-    "pycraft/viewer",
     # names of mutants, which tests/mutation.md quotes
     "tests/mutants/of_cpp.py",
     "tests/mutants/of_integrators.py",
     "tests/mutants/of_python.py",
     "tests/mutants/of_scenes.py",
     # messages that they match
-    "tests/ensembles/test_sweeps.py",
     "tests/operators/test_embedded.py",
     "tests/operators/test_loop_second_derivatives.py",
     "tests/scenes/test_checkpoints.py",
     "tests/scenes/test_runs_on_disk.py",
-    "tests/viewer/test_view_server.py",
 ]
 
 # A body may hang on these.

@@ -36,7 +36,7 @@ def test_a_lemma_that_cites_itself_or_a_later_one_is_refused(monkeypatch):
     for word, cited in (("φ E_φ", "φ E_φ = φ − I"), ("E_φ", "E_ψ = E_φ − K H")):
         fresh = Theory()
         fresh._lemmas = {**fresh._lemmas, "φ E_φ = φ − I": [(word, cited)]}
-        with pytest.raises(AssertionError, match="does not stand above it"):
+        with pytest.raises(AssertionError, match="is not an earlier lemma"):
             fresh("φ E_φ = φ − I")
     a = Equation("lemma", "a", parse("φ"), parse("ψ"))
     b = Equation("lemma", "b", parse("ψ"), parse("φ"), uses=[a])

@@ -494,7 +494,7 @@ def test_code_turns_the_camera(browser):
         with shown_page(browser, view) as another:
             ready(another)
             assert another.evaluate("[figure.zoom, figure.follow]") == [2, "6"]
-        for wrong, words in ((("moon",), "there are 'from above'"), (("top", "moon"), "'robot', a body of 'panda'")):
+        for wrong, words in ((("moon",), "choose from 'from above'"), (("top", "moon"), "'robot', a body of 'panda'")):
             with pytest.raises(pc.Error, match=words):
                 view.look(*wrong)
         with pytest.raises(pc.EvaluationError, match="zoom=0"):
