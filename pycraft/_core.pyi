@@ -7,7 +7,7 @@ import fractions
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'EmbeddedOperators', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'fluid_drag_effect', 'forms', 'gravity_compensation_effect', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'held_states', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'retired_integrator', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scene_at_rest', 'scene_between', 'scene_curvature', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_accelerations', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'vector', 'wider', 'wrench_effect', 'zero']
+__all__: list[str] = ['Binding', 'Centroidal', 'Curvature', 'Dynamics', 'Effect', 'EmbeddedOperators', 'Error', 'EvaluationError', 'FrameTree', 'FunctionOfTime', 'GroupedOperators', 'HingeKind', 'HybridDynamics', 'Integration', 'InterbodyForces', 'Letter', 'LoopSet', 'MatrixTree', 'Methods', 'ModelError', 'Multibody', 'MultibodyOperators', 'Operator', 'Parameter', 'PassCounts', 'Plan', 'PreparedHybridDynamics', 'RefinementError', 'RunRecord', 'Scalar', 'SceneCalls', 'SceneEffects', 'Sensitivities', 'SingularHingeError', 'SingularOperatorError', 'SkoSource', 'Space', 'SpaceError', 'StaleOperatorError', 'SubhingeKind', 'SymbolDefinition', 'Theorem', 'alone', 'blockdiag', 'bushing_effect', 'check_pairing', 'checked_refinement', 'compiled_call', 'constant', 'constant_in_time', 'coordinates_named', 'coulomb_friction_effect', 'damping_effect', 'direct_call', 'direct_calls', 'epsilons', 'equal_by_theorems', 'euclidean', 'external', 'fixman_effect', 'float128', 'fluid_drag_effect', 'forms', 'frame_tape', 'gravity_compensation_effect', 'gravity_effect', 'gravity_gradient_effect', 'harmonic', 'held_states', 'hermite_between', 'hinge_kinds', 'identity', 'implicit_damping_effect', 'implicit_spring_effect', 'instruction_set', 'instruction_sets', 'integrator_table', 'integrators', 'kernel_headers', 'kernel_tape', 'langevin_effect', 'limits_effect', 'methods', 'motor_effect', 'node_damper_effect', 'node_spring_effect', 'nose_hoover_effect', 'numbers_in_q', 'operators_of', 'pack_width', 'piecewise_polynomial', 'point_mass_gravity_effect', 'precisions', 'prepared_call', 'prescribed_by', 'prescribed_effect', 'python_effect', 'python_function_of_time', 'quadratic_damping_effect', 'real_array', 'record_from', 'residual', 'retired_integrator', 'rotor_inertia_effect', 'run_scene', 'run_scenes', 'scalar', 'scalar_tape', 'scene_at_rest', 'scene_between', 'scene_curvature', 'scene_interbody_forces', 'scene_linearized', 'servo_effect', 'spring_effect', 'step_accelerations', 'step_kinds', 'subhinge_kinds', 'symbols', 'theorems', 'time_apply', 'time_by_hand', 'time_compiled', 'time_dynamics', 'time_forward', 'time_hybrid', 'time_method', 'time_packs', 'time_passes', 'time_scene', 'torque_source_effect', 'unbound_sources', 'vector', 'wider', 'wrench_effect', 'zero']
 
 class Error(Exception): ...
 class SpaceError(Error, TypeError): ...
@@ -270,6 +270,11 @@ class SkoSource:
     @property
     def hinge_names(self) -> list[str]:
         ...
+    @property
+    def model(self) -> typing.Any:
+        """
+        The multibody model whose operators these are; None for a tree of given matrices.
+        """
     @property
     def name(self) -> str:
         ...
@@ -688,6 +693,11 @@ class Plan:
         """
         A symbol's numbers at a context's state: a vector, or one block per body; `state` picks one of a batch.
         """
+    def tape(self, most: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+        """
+        What the plan does, operation by operation, at states that are decided as the one that it is bound to, a batch of one (tapes.h); the arrays
+        that it reads, each ("q", "v", "x" or "vector", name, width), by number; rows and columns of the result.
+        """
     @property
     def flops(self) -> float:
         """
@@ -798,16 +808,10 @@ class MultibodyOperators(SkoSource):
     """
     def __reduce__(self) -> tuple:
         ...
-    @property
-    def model(self) -> Multibody:
-        ...
 class GroupedOperators(SkoSource):
     """
     The source of a multibody model's operators with its bodies in groups.
     """
-    @property
-    def model(self) -> Multibody:
-        ...
 class EmbeddedOperators(SkoSource):
     """
     The source of a multibody model's operators with its loops embedded.
@@ -827,9 +831,6 @@ class EmbeddedOperators(SkoSource):
         """
         The tree's coordinate of each of Θ.
         """
-    @property
-    def model(self) -> Multibody:
-        ...
     @property
     def rows(self) -> list[list[int]]:
         """
@@ -1579,6 +1580,10 @@ def forms() -> list[str]:
     """
     The forms of the articulated-inertia sweep.
     """
+def frame_tape(model: Multibody, call: str, frame: str) -> tuple:
+    """
+    The pose (4, 4) or the Jacobian (6, nv) of a body or node, operation by operation.
+    """
 def gravity_compensation_effect(model: Multibody, bodies: collections.abc.Sequence[str] | None, share: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], points: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], g: typing.Any) -> Effect:
     ...
 def gravity_effect(g: typing.Any) -> Effect:
@@ -1701,6 +1706,10 @@ def run_scenes(calls: collections.abc.Sequence[SceneCalls], records: collections
     """
 def scalar(value: float | fractions.Fraction) -> Scalar:
     ...
+def scalar_tape(scalar: Scalar, most: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+    """
+    As Plan.tape, of a scalar.
+    """
 def scene_at_rest(calls: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], t: typing.SupportsFloat | typing.SupportsIndex, states: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> dict:
     """
     At a configuration at rest: what is left of all forces, its derivative along displacements, ℳ + J, and which coordinates are prescribed.
@@ -1777,6 +1786,10 @@ def time_scene(scene: SceneCalls, q: typing.Annotated[numpy.typing.ArrayLike, nu
     """
 def torque_source_effect(model: Multibody, hinges: collections.abc.Sequence[str] | None, torque: FunctionOfTime, effort_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_limit: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], speed_band: typing.SupportsFloat | typing.SupportsIndex) -> Effect:
     ...
+def unbound_sources(operands: collections.abc.Sequence[Operator]) -> list[SkoSource]:
+    """
+    The sources whose state `at` would bind.
+    """
 def vector(name: str, space: Space) -> Operator:
     """
     A named vector of a space: stands for an array that is given at the evaluation.

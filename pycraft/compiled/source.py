@@ -22,8 +22,16 @@ _PIECE = 1000
 _SIGNS = {"add": " + ", "subtract": " - ", "multiply": " * ", "divide": " / "}
 _STRENGTH = {"add": 1, "subtract": 1, "negate": 2, "multiply": 3, "divide": 3}
 _COMPARED = {"greater": " > ", "at_least": " >= "}
-_CALLED = {"magnitude": "magnitude_of", "larger": "larger_of", "sqrt": "root_of", "log": "log_of", "sine": "sine_of", "cosine": "cosine_of",
-           "fraction": "fraction_of", "exponent": "exponent_of"}
+_CALLED = {
+    "magnitude": "magnitude_of",
+    "larger": "larger_of",
+    "sqrt": "root_of",
+    "log": "log_of",
+    "sine": "sine_of",
+    "cosine": "cosine_of",
+    "fraction": "fraction_of",
+    "exponent": "exponent_of",
+}
 
 
 def _runtime(name: str) -> str:
