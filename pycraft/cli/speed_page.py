@@ -178,24 +178,25 @@ Written by `pycraft bench --peers --page docs/performance.md`: no figure on this
 
 {machine}
 
-Compare figures of one run alone: another machine has others.
+Compare only figures of one run: they differ between machines.
 
-Times are microseconds. Each is the least median of several rounds on one core, after a warm-up; what a ratio compares is timed in turn. A
-ratio is the other package's time over ours: above one ours is faster; ✓ meets its goal, ✗ misses it. All results agree in the run that
-times them, to {WRONG:g} of the largest entry: with every package's, and where none goes, with our own in extended precision.
+Times are microseconds. Each is the least median of several rounds on one core, after a warm-up; the two times of a ratio are taken in
+turns. A ratio is the other package's time over ours: above one ours is faster; ✓ meets its goal, ✗ misses it. All results are compared in
+the run that times them, and agree to {WRONG:g} of the largest entry with every package, or, where no package runs, with our own in
+extended precision.
 
-*C++* is our call in the core, its checks included, over {STATES} states in rotation. Pinocchio's time in C++ is, of forward and inverse
-dynamics of up to 100 coordinates, that of its own loops in C++ over states (`abaInParallel`, `rneaInParallel`, one thread); of all else its
-call from Python less the same call on a model without joints and less the copies of matrices that its bindings make. *Python* is a call
-from Python on arrays that are ready; the ratio is over the fastest package.
+*C++* is our call in the core, its checks included, over {STATES} states in rotation. For forward and inverse dynamics of up to 100
+coordinates, Pinocchio's time in C++ is the time of its own C++ loops over states (`abaInParallel`, `rneaInParallel`, one thread);
+otherwise it is its call from Python less the same call on a model without joints and less the copies of matrices that its bindings make.
+*Python* is a call from Python on existing arrays; the ratio is to the fastest package.
 
 {_compared(found)}
-ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python fills both triangles, too, and that is counted. MuJoCo's calls leave
-contacts and constraints off; its `mj_forward` computes positions, inertias, their factors and accelerations, and no state is set while the
-clock runs. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest joints; robots are as
-their files have them, legged ones on a free base. Λ is that of the last body, 6 × 6, and of it and the one in the middle, 12 × 12,
-where both move in every direction; Pinocchio's time is that of its inverse alone, which is then to be inverted, less that on a model of
-one joint.
+ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python also fills both triangles, and its time includes this. MuJoCo's
+calls have contacts and constraints disabled; its `mj_forward` computes positions, inertias, their factors and accelerations, and the time
+does not include setting a state. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest
+joints; robots are used as in their files, legged ones on a free base. Λ is computed for the last body, 6 × 6, and for the last and the
+middle body together, 12 × 12, if both move in every direction; Pinocchio's time covers only its inverse, which remains to be inverted,
+less the time on a model of one joint.
 
 ## Goals
 
@@ -205,30 +206,29 @@ one joint.
 {_calls(found)}
 ## Batches
 
-Forward dynamics of {BATCH} states at once from Python, a state's share, and one call of Pinocchio's in C++ over it. Goals on this
+Forward dynamics of {BATCH} states at once from Python, per state, and the ratio of one call of Pinocchio's in C++ to it. Goals on this
 instruction set: {asked}.
 
 {_markdown(BATCH_HEADINGS, batch_cells(found))}
 ## Code for one model
 
-Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, beside the call itself and Pinocchio's in
-C++; ratios over the compiled call. Code that is built on the machine that runs it uses all of its instructions, fused ones among them.
+Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, compared with the ordinary call and
+Pinocchio's in C++; ratios to the compiled call. Code built where it runs uses all instructions of the machine.
 
 {_markdown(COMPILED_HEADINGS, compiled_cells(found), words=3)}
-## How cost grows
+## Growth of cost
 
-The fitted p of time ~ Nᵖ in C++, on chains of {FITTED_FROM} links and more, up to the longest that was timed. ℳ and ℳ⁻¹ have N² entries,
+The fitted p of time ~ Nᵖ in C++, on chains of {FITTED_FROM} links and more, up to the longest one timed. ℳ and ℳ⁻¹ have N² entries,
 derivatives twice and three times as many.
 
 {_markdown(["call", "p, ours", "p, Pinocchio"], fitted(found))}
-## What accuracy costs
+## Cost of accuracy
 
 Forward dynamics in other forms and precisions, as a ratio to form `fast` in double, timed in turn; errors against quad precision; ✓ is
-within its bound, ✗ over it. Direct calls of forward dynamics run kernels in every way that stands here.
-What each way is for:
-[accuracy.md](accuracy.md).
+within its bound, ✗ over it. Direct calls of forward dynamics run kernels in every row here. [accuracy.md](accuracy.md)
+describes each method.
 
 {_markdown(COST_HEADINGS, cost_cells(costs))}
-## Left out
+## Not measured
 
 {left_out}"""
