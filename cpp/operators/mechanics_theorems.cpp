@@ -59,7 +59,7 @@ struct MechanicsTheorems : Statements {
       for (int i = 0; i < 6; ++i) pick[size_t(i) * robot->structure().dimension() + i] = 1;
       const Expression root = constant(std::move(pick), robot->forces(), Space::euclidean(6), "root");
       state("momentum matrix about the root", root * phi * R * H.T(), root * phi * M * phi.T() * H.T(), no_hypothesis, "soa.md #19");
-      shown("[φRH*](r,k) = [φMφ*H*](r,k), r a root", "[\\phi\\mathcal{R}H^*](r,k) = [\\phi M\\phi^*H^*](r,k),\\quad r\\text{ a root}");
+      shown("[φRH*](r,k) = [φMφ*H*](r,k), r a root", "[\\phi\\mathcal{R}H^*]\\,(r,k) = [\\phi M\\phi^*H^*]\\,(r,k),\\quad r\\text{ a root}");
     }
   }
 

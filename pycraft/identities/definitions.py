@@ -19,8 +19,8 @@ from .spelling import GREEK, spelled
 from .standard_letters import STANDARD
 from .vocabulary import ParseError, is_known
 
-_SPACE = r"Θ|Theta|\\Theta|\\mathcal\s*\{?\s*V\s*\}?|𝒱|V|F|W|R\^?\d*"
-_MAP = re.compile(rf"({_SPACE})\s*(?:→|->|\\to|\\rightarrow)\s*({_SPACE})$")
+_SPACE = r"Θ|Theta|\\Theta|\\mathcal\s*\{?\s*V\s*\}?|𝒱|V|F|R\^?\d*"
+_MAP = re.compile(rf"({_SPACE}|W)\s*(?:→|->|\\to|\\rightarrow)\s*({_SPACE}|W)$")
 _VECTOR = re.compile(rf"({_SPACE})$")
 _SIGNS = (":=", "≜", "≝", "\\triangleq", "\\coloneqq", "∈", "\\in ", " in ", ":")
 _BEHIND = re.compile(r"(?:\b(?:where|with|and)\b|(?<!\\)[,;]|\\q?quad(?![A-Za-z])|\\text\s*\{\s*(?:where|with|and)\s*\}|\s)*")

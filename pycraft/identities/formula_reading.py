@@ -10,12 +10,12 @@ from functools import lru_cache
 from .determinant_equations import as_logarithms
 from .formula import FUNCTIONS, INDEXED, SYMBOLS, Call, Formula, Letter, Node, Number, Power, Star, inverted, product, starred, total
 from .inequalities import related
-from .part_letters import HYBRID, OF_TREES
+from .part_letters import HYBRID, OF_ROTORS, OF_TREES
 from .spelling import spelled
 from .standard_letters import GUARDED, STANDARD
 from .vocabulary import ParseError, decimal
 
-_PLAIN = (set(SYMBOLS) - set(INDEXED)) | {"X", "V", "vdot", *STANDARD, *HYBRID, *OF_TREES}
+_PLAIN = (set(SYMBOLS) - set(INDEXED)) | {"X", "V", "vdot", *STANDARD, *HYBRID, *OF_TREES, *OF_ROTORS}
 LETTERS = frozenset(_PLAIN | {f"{name}_dot" for name in _PLAIN - {"I", "N"} if not name.endswith("dot")})
 """Letters that formulas have without definitions."""
 

@@ -23,7 +23,7 @@ from .statement_text import telling_of
 
 _TOLD_BY = re.compile(
     r"(?<![a-z_\d\\])(?:" + "|".join(sorted(map(re.escape, {*ON_LOOPS, "Q_s", "B_e"}), key=len, reverse=True)) + r")(?![a-z\d])"
-    r"|(?<![a-z_\d\\])(?:Q|Q_dot)(?![a-zA-Z_\d])"
+    r"|(?<![A-Za-z_\d\\])(?:Q|Q_dot)(?![A-Za-z_\d])"
 )
 
 

@@ -148,7 +148,8 @@ class Vocabulary:
     @property
     def names(self) -> set[str]:
         """Names that stand alone, without arguments."""
-        letters = {*_NAMES, *_ALIASES, *STANDARD, *PARTS, *self.own}
+        loops = getattr(self._operators._model, "loops", ())
+        letters = {*_NAMES, *_ALIASES, *STANDARD, *(PARTS if len(loops) else PARTS - {"Q", "A"}), *self.own}
         numbers = {"I", "N"} - {d.name for d in self._definitions}
         return letters | {f"{name}_dot" for name in letters - numbers if not name.endswith("dot")}
 

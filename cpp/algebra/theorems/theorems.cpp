@@ -161,7 +161,7 @@ struct TreeTheorems : Statements {
     state("Ω decomposed by Υ, blocks on one path", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde);
     list.back().on_one_path = true;
     shown("Ω(i,j) = [Υ + ψ̃*Υ + Υψ̃](i,j), i and j on one path to the base",
-          "\\Omega(i,j) = [\\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi](i,j),\\quad i\\text{ and }j\\text{ on one path to the base}");
+          "\\Omega(i,j) = [\\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi]\\,(i,j),\\quad i\\text{ and }j\\text{ on one path to the base}");
     const Expression siblings = E_psi.T() * Upsilon * E_psi - block_diagonal(E_psi.T() * Upsilon * E_psi);
     state("Ω decomposed with siblings", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde + psi.T() * siblings * psi, no_hypothesis, check,
           "soa.md #28");
