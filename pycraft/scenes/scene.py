@@ -306,7 +306,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         q=None,
         v=None,
         *,
-        integrator: str = "dopri5",
+        integrator: str = "auto",
         rtol: float = 1e-9,
         atol: float = 1e-12,
         step: float | None = None,
@@ -325,10 +325,10 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         ----------
         T : s
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls; prescribed coordinates are their motion's
-        integrator : {"dopri5", "auto", "dop853", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "DOP853", "cvode", ...}
-            docs/simulation.md explains the choice. "rosenbrock4" is for stiff scenes, and "auto" uses it where the motion is stiff;
-            "variational2" and "variational4" are for long motions; "semi-implicit-euler" (order 1) adds implicit damping and stiffness to
-            D: stable for any values, while explicit stiffness still limits the step.
+        integrator : {"auto", "dopri5", "dop853", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "DOP853", "cvode", ...}
+            docs/simulation.md explains the choice. "auto" equals "dopri5", bit for bit, until the motion becomes stiff, and uses
+            "rosenbrock4" as long as it is; "variational2" and "variational4" are for long runs; "semi-implicit-euler" (order 1) adds
+            implicit damping and stiffness to D: stable for any values, while explicit stiffness still limits the step.
         rtol, atol : tolerances on the error of one step, per component of q, v and the effects' own states
         step : s
             Size of fixed steps; for other integrators the first step, chosen automatically by default.

@@ -26,7 +26,7 @@ class Viewed:
         -------
         View
             A notebook shows it in its cell; open `address` in a browser; `close()` ends it. It uses `run_options` of the scene
-            ("integrator", "rtol", "atol", "step"); default: dopri5 with rtol 1e-7.
+            ("integrator", "rtol", "atol", "step"); default: "auto" with rtol 1e-7.
 
         Raises
         ------
