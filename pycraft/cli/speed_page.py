@@ -1,4 +1,4 @@
-"""What `pycraft bench --peers` shows of a run: the table for the terminal, docs/performance.md."""
+"""Output of `pycraft bench --peers`: the table for the terminal, docs/performance.md."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ COMPARED: dict[str, dict[str, str]] = {
         "MuJoCo": "`mj_kinematics`, `mj_comPos`, `mj_crb`, `mj_factorM`, `mj_solveM`",
     },
 }
-"""The calls of other packages that are timed, by call and package."""
+"""The timed calls of other packages, by call and package."""
 
 
 def number(value: float | None) -> str:
-    """Three digits, without an exponent up to a million."""
+    """Return three digits, without an exponent up to a million."""
     if value is None:
         return ""
     return f"{value:,.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"
@@ -54,22 +54,23 @@ def _time(time: Time | None) -> str:
 
 
 def _ratio(ratio: float | None, met: bool | None) -> str:
-    """A ratio to three digits, with a mark where there is a goal."""
+    """Return a ratio to three digits, with a mark if there is a goal."""
     return "" if ratio is None else f"{ratio:.3g}" + {None: "", True: " ✓", False: " ✗"}[met]
 
 
 def packages(found: Measured) -> list[str]:
-    """The other packages that were timed, Pinocchio first."""
+    """Return the other packages that were timed, Pinocchio first."""
     return list(dict.fromkeys(name for row in found.rows for name in row.peers))
 
 
 def headings(found: Measured) -> list[str]:
-    """Of the table: in C++ ours, Pinocchio's and their ratio; from Python ours, all packages' and the ratio of the fastest."""
+    """Return the headings of the table: in C++ ours, Pinocchio's and their ratio; from Python ours, all packages' and the ratio of the
+    fastest."""
     return ["model", "nv", "C++", "Pinocchio", "ratio", "Python", *packages(found), "ratio"]
 
 
 def cells(row: Row, others: Iterable[str]) -> list[str]:
-    """One line of the table: times in microseconds, ratios over ours."""
+    """Return one line of the table: times in microseconds, ratios over ours."""
     cpp, python = row.met
     theirs = [_time(row.peers.get(name)) for name in others]
     own = [row.model, str(row.nv), _time(row.kernel), _time(row.peer_kernel), _ratio(row.ratio, cpp)]
@@ -77,12 +78,12 @@ def cells(row: Row, others: Iterable[str]) -> list[str]:
 
 
 def of_call(found: Measured, call: str) -> list[Row]:
-    """The rows of one call."""
+    """Return the rows of one call."""
     return [row for row in found.rows if row.call == call]
 
 
 def goals(found: Measured) -> list[list[str]]:
-    """By call: the goal in C++, how many models meet it, the range of ratios; the same from Python."""
+    """Return, by call: the goal in C++, how many models meet it, the range of ratios; the same from Python."""
     lines = []
     for call, both in GOALS.items():
         line = [CALLS[call]]
@@ -100,7 +101,7 @@ BATCH_HEADINGS = ["model", "nv", "double, a state", "ratio", "single, a state", 
 
 
 def batch_cells(found: Measured) -> list[list[str]]:
-    """Lines of the table of batches."""
+    """Return the lines of the table of batches."""
     lines = []
     for row in found.batches:
         line = [row.model, str(row.nv)]
@@ -116,7 +117,7 @@ COMPILED_HEADINGS = ["model", "nv", "call", "operations", "build, s", "C++", "th
 
 
 def compiled_cells(found: Measured) -> list[list[str]]:
-    """Lines of the table of code compiled for one model."""
+    """Return the lines of the table of code compiled for one model."""
     lines = []
     for row in found.compiled:
         line = [row.model, str(row.nv), CALLS[row.call], f"{row.operations:,}", f"{row.built:.1f}", _time(row.kernel), _time(row.ordinary)]
@@ -125,7 +126,7 @@ def compiled_cells(found: Measured) -> list[list[str]]:
 
 
 def cost_cells(figures: list[Figure]) -> list[list[str]]:
-    """Lines of the table of what accuracy costs."""
+    """Return the lines of the table of the cost of accuracy."""
     return [[f.name, f"{f.value:.3g}", "" if f.bound is None else f"{f.bound:g}" + (" ✓" if f.passed else " ✗"), f.note] for f in figures]
 
 
@@ -133,13 +134,13 @@ COST_HEADINGS = ["way", "ratio", "bound", "time and error"]
 
 
 def fitted(found: Measured) -> list[list[str]]:
-    """Lines of the table of exponents, ours and Pinocchio's."""
+    """Return the lines of the table of exponents, ours and Pinocchio's."""
     own, theirs = exponents(found.rows), exponents(found.rows, peer=True)
     return [[CALLS[call], f"{p:.2f}", f"{theirs[call]:.2f}" if call in theirs else ""] for call, p in own.items()]
 
 
 def _markdown(head: list[str], lines: list[list[str]], words: int = 1) -> str:
-    """A table whose first columns, so many, are words."""
+    """Return a table; its first `words` columns are text."""
     rule = ["---" if i < words else "---:" for i in range(len(head))]
     return "\n".join("| " + " | ".join(line) + " |" for line in (head, rule, *lines)) + "\n"
 
@@ -166,7 +167,7 @@ def _calls(found: Measured) -> str:
 
 
 def page(found: Measured, costs: list[Figure]) -> str:
-    """docs/performance.md: everything on it is measured in the run that writes it."""
+    """Return docs/performance.md: all its figures are measured in the run that writes it."""
     machine = "\n".join(f"- {name}: {value}" for name, value in found.machine.items())
     batch_goals = BATCH_GOALS[found.machine["instruction set"]]
     asked = " and ".join(f"{goal:g} in {p}" for goal, p in zip(batch_goals, ("double", "single"), strict=True) if goal) or "none here"

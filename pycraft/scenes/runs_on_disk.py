@@ -17,15 +17,19 @@ from .coordinate_units import coordinate_units
 from .events import EventStates
 from .run_tables import HOLDS, columns_of, variables_of
 
-FORMAT = "pycraft run 1"
+FORMAT = "pycraft run 2"
+FORMATS = ("pycraft run 1", FORMAT)
+"""Those that are read. Files of the first do not say with which accelerations steps end, nor what controllers hold."""
 ABOUT = ("effects", "workers", "energy", "integrator", "options", "precision")
-"""What a run says of itself beside its model."""
+"""Data of a run in addition to its model."""
 ENDINGS = (".nc", ".parquet", ".csv")
+BETWEEN = ("vdot_after", "vdot_before")
+"""Columns of a Parquet file, where they differ from the accelerations at its rows: with which steps begin there, and end."""
 
 
 def checked_output(path: Any) -> Path:
-    """A path that a run can be written to. EvaluationError for an ending that is none of `ENDINGS`, OSError where it cannot be written,
-    ImportError where a package is missing: before the run, not after it."""
+    """Check, before the run, that a run can be written to a path. Raises EvaluationError for an ending not in `ENDINGS`, OSError if it
+    cannot be written, ImportError if a package is missing."""
     target = writable_target(path, ENDINGS, "a run")
     if target.suffix == ".parquet":
         _pyarrow()
@@ -39,35 +43,35 @@ def save(run: Any, path: str | Path) -> None:
 
 
 def load_run(path: str | Path) -> Any:
-    """The run that `Run.save` wrote to a NetCDF or Parquet file, with its model.
+    """Load a run that `Run.save` wrote to a NetCDF or Parquet file, with its model.
 
-    It has no scene behind it: it does not go on, and between its times there are configurations and velocities alone. Of Parquet these are
-    between the rows of the table, of NetCDF between the ends of steps.
+    It has no scene: it cannot be resumed, and between its times it has only configurations and velocities, interpolated for Parquet
+    between the rows of the table, for NetCDF between the ends of steps.
 
     Raises
     ------
     EvaluationError
         A file of another kind.
     OSError
-        None that can be read.
+        The file cannot be read.
     """
     target = Path(path)
     readers = {".nc": _from_netcdf, ".parquet": _from_parquet}
     if target.suffix not in readers:
-        raise _core.EvaluationError(f"{str(path)!r}: runs are read from files that end in {' and '.join(readers)}")
+        raise _core.EvaluationError(f"{str(path)!r}: a run can be read from files that end in {' and '.join(readers)}")
     if not target.is_file():
         raise FileNotFoundError(f"there is no file {str(path)!r}")
-    with target.open("rb"):  # OSError where it cannot be read at all
+    with target.open("rb"):  # OSError if it cannot be read at all
         pass
     try:
         return readers[target.suffix](target)
     except (ImportError, _core.EvaluationError):
         raise
-    except Exception as error:  # of damaged bytes anything may come
+    except Exception as error:  # damaged bytes may raise anything
         raise _core.EvaluationError(f"{str(path)!r} holds no run, or a damaged one ({error}); `run.save(path)` writes one") from None
 
 
-# ---------------------------------------------------------------------- what is told beside the numbers
+# ---------------------------------------------------------------------- data besides the numbers
 
 
 def _about(run: Any) -> str:
@@ -90,10 +94,11 @@ def _run(
     from .run import Run
 
     told = json.loads(text)
-    if told.get("format") != FORMAT:
-        raise _core.EvaluationError(f"{str(path)!r} holds no run of this version: its format is {told.get('format')!r}, not {FORMAT!r}")
+    if told.get("format") not in FORMATS:
+        known = " or ".join(repr(each) for each in FORMATS)
+        raise _core.EvaluationError(f"{str(path)!r} holds a run in the format {told.get('format')!r}; this version reads {known}")
     if missing := [name for name in ABOUT if name not in told["about"]]:
-        raise ValueError(f"it does not say: {', '.join(missing)}")
+        raise ValueError(f"it lacks: {', '.join(missing)}")
     about = told["about"] | {"model": Multibody.from_description(told["model"])}
     n, nq, nv = len(rows["t"]), about["model"].nq, about["model"].nv
     widths = {"t": (n,), "q": (n, nq), "v": (n, nv)}
@@ -105,7 +110,10 @@ def _run(
     if steps is not None:
         ends = len(steps["t"])
         steps = {name: x.reshape((ends, *(widths[name][1:] if name in widths else x.shape[1:]))) for name, x in steps.items()}
-    run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=told["statistics"])
+    statistics = told["statistics"]
+    if "switches" in statistics:
+        statistics["switches"] = [(at, method) for at, method in statistics["switches"]]
+    run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=statistics)
     run.__dict__["_along"] = {
         **along,
         "forces": along["forces"].reshape(len(about["effects"]), n, nv),
@@ -127,7 +135,9 @@ def _to_netcdf(run: Any, path: Path) -> None:
     if steps is not None and steps["t"] is not run.t:
         axes_of = {"t": (), "q": ("configuration",), "v": ("coordinate",), "states": ("state",), "work": ("worker",)}
         variables |= {f"step_{name}": (("step", *axes_of[name]), steps[name], "") for name in axes_of}
-        variables["step_vdot"] = (("step", "coordinate"), run._vdot_of_steps, "")
+        variables |= _accelerations(run, "step")
+    elif steps is not None and any(not np.array_equal(each, run.vdot) for each in run._vdot_of_steps):
+        variables |= _accelerations(run, "time")
     with netcdf_file(str(path), "w", version=2) as file:
         file.about = _about(run).encode("utf-8")
         sizes: dict[str, int] = {}
@@ -153,12 +163,20 @@ def _from_netcdf(path: Path) -> Any:
     n, empty = len(found["time"]), np.zeros((len(found["time"]), 0))
     rows = {"t": found["time"], **{name: found.get(name, empty) for name in ("q", "v", "states", "work")}}
     along = {name: found.get(name, empty) for name in ("vdot", "forces", "potential")} | {"kinetic": found.get("kinetic", np.zeros(n))}
-    if "step_t" not in found:
-        return _run(about, path, rows, None, along)
-    empty = np.zeros((len(found["step_t"]), 0))
-    run = _run(about, path, rows, {name: found.get(f"step_{name}", empty) for name in ("t", "q", "v", "states", "work")}, along)
-    run.__dict__["_vdot_of_steps"] = found.get("step_vdot", empty)
+    steps = None
+    if "step_t" in found:
+        empty = np.zeros((len(found["step_t"]), 0))
+        steps = {name: found.get(f"step_{name}", empty) for name in ("t", "q", "v", "states", "work")}
+    run = _run(about, path, rows, steps, along)
+    if steps is not None or "step_vdot" in found:
+        after = found.get("step_vdot", empty)
+        run.__dict__["_vdot_of_steps"] = after, found.get("step_vdot_before", after)
     return run
+
+
+def _accelerations(run: Any, axis: str) -> dict[str, tuple[tuple[str, ...], np.ndarray, str]]:
+    """With which steps begin and end."""
+    return dict(zip(("step_vdot", "step_vdot_before"), (((axis, "coordinate"), x, "") for x in run._vdot_of_steps), strict=True))
 
 
 # ---------------------------------------------------------------------- tables
@@ -169,13 +187,18 @@ def _pyarrow() -> Any:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise ImportError(f"Parquet needs pyarrow: {HOLDS}; '.nc' and '.csv' need nothing") from None
+        raise ImportError(f"Parquet needs pyarrow: {HOLDS}; '.nc' and '.csv' need no package") from None
     return pyarrow
 
 
 def _to_parquet(run: Any, path: Path) -> None:
     pyarrow = _pyarrow()
-    table = pyarrow.table({name: np.ascontiguousarray(x) for name, x in columns_of(run).items()})
+    columns = columns_of(run)
+    if run._steps is not None and run._steps["t"] is run.t:
+        for start, x in zip(BETWEEN, run._vdot_of_steps, strict=True):
+            if not np.array_equal(x, run.vdot):
+                columns |= {f"{start}.{name}": x[:, i] for i, name in enumerate(run.model.coordinate_names)}
+    table = pyarrow.table({name: np.ascontiguousarray(x) for name, x in columns.items()})
     pyarrow.parquet.write_table(table.replace_schema_metadata({"pycraft": _about(run)}), str(path))
 
 
@@ -197,7 +220,9 @@ def _from_parquet(path: Path) -> Any:
     rows = {"t": columns["t"], "q": those("q", of_q), "v": those("v", of_v), "states": states, "work": those("work", effects)}
     forces = np.stack([those(f"force.{effect}", of_v) for effect in effects]) if effects else np.zeros((0, n, len(of_v)))
     along = {"vdot": those("vdot", of_v), "forces": forces, "kinetic": columns["kinetic"], "potential": those("potential", effects)}
-    return _run(about, path, rows, None, along)
+    run = _run(about, path, rows, None, along)
+    run.__dict__["_vdot_of_steps"] = tuple(x if x.shape[1] else along["vdot"] for x in (those(start, of_v) for start in BETWEEN))
+    return run
 
 
 def _to_csv(run: Any, path: Path) -> None:

@@ -58,7 +58,7 @@ def test_as_by_multipliers(name):
 
 
 def test_the_order_of_states_is_not_felt():
-    """What a state's numbers are does not hang on what was asked before it."""
+    """The values at a state do not depend on earlier requests."""
     model = two_loops()
     q, v, tau, _ = states_of(model, 4)
     forward = model.constrained_dynamics(q, v, tau, method="embed").vdot
@@ -219,8 +219,8 @@ def test_refusals():
         with pytest.raises(error, match=says):
             model.constrained_dynamics(q, v, **({"method": "embed"} | how))
 
-    call(pc.EvaluationError, "'fast' alone", form="ud")
-    call(pc.EvaluationError, "'same' alone; take a wider precision", residual="wider")
+    call(pc.EvaluationError, "only 'fast' is available", form="ud")
+    call(pc.EvaluationError, "only 'same' is available; use a wider precision", residual="wider")
     call(pc.EvaluationError, "assemble", alpha=1.0)
     call(pc.EvaluationError, "assemble", beta=1.0)
     call(pc.EvaluationError, "has no independent coordinates", method="augment", independent=[first])

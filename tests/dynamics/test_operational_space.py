@@ -56,7 +56,7 @@ REGULAR = [
 
 @pytest.mark.parametrize("name, model, count", REGULAR, ids=[name for name, *_ in REGULAR])
 def test_inertia(name, model, count):
-    """Λ is the inverse, and that of the operators."""
+    """Λ is the inverse, and equals the operators'."""
     names = moving(model)
     of = [names[-1], names[len(names) // 2], names[0 if name == "every kind" else len(names) // 4]][:count]
     Q = states(model, 5)[0]
@@ -151,8 +151,8 @@ def test_what_is_asked_wrongly():
         for names, error, words in (
             ("nose", pc.ModelError, "nose"),
             (["panda_link7", "nose"], pc.ModelError, "nose"),
-            (3, pc.ModelError, "text, not by 3"),
-            (["panda_link7", 3], pc.ModelError, "text, not by 3"),
+            (3, pc.ModelError, "string, not by 3"),
+            (["panda_link7", 3], pc.ModelError, "string, not by 3"),
             ([], pc.ModelError, "at least one node"),
         ):
             with pytest.raises(error, match=words):

@@ -138,15 +138,15 @@ def test_prepared_hybrid_dynamics_follows_edits(monkeypatch):
         (lambda m: m.prepare("inverse_dynamics_derivatives")(m.q, m.v), TypeError, "takes q, v, vdot; it was given 2"),
         (lambda m: m.prepare("inverse_dynamics_derivatives")(m.q, m.v, m.v, out=m.v), TypeError, "no out="),
         (lambda m: m.prepare("pose", frame="nose"), pc.ModelError, "nose"),
-        (lambda m: m.prepare("pose", frame=3), pc.ModelError, "text, not by 3"),
+        (lambda m: m.prepare("pose", frame=3), pc.ModelError, "string, not by 3"),
         (lambda m: m.prepare("pose", frame="panda_link7")(m.q, out=np.empty((2, 4, 4))), pc.ModelError, r"shape \(4, 4\)"),
         (lambda m: m.pose("panda_link7", m.q, precision="double"), TypeError, "precision"),
         (lambda m: m.mass_matrix(m.q, form="ud"), TypeError, "form"),
         (lambda m: m.mass_matrix_inverse(m.q, method="articulated"), TypeError, "method"),
         (lambda m: m.prepare("bias_forces")(m.q), TypeError, "q, v"),
-        (lambda m: m.prepare("mass_matrix", batch=3)(m.q), pc.ModelError, "3 states and is given one state"),
-        (lambda m: m.prepare("mass_matrix")(np.tile(m.q, (2, 1))), pc.ModelError, "one state and is given 2 states"),
-        (lambda m: m.prepare("mass_matrix", batch=3)(np.tile(m.q, (2, 1))), pc.ModelError, "3 states and is given 2 states"),
+        (lambda m: m.prepare("mass_matrix", batch=3)(m.q), pc.ModelError, "3 states but got one state"),
+        (lambda m: m.prepare("mass_matrix")(np.tile(m.q, (2, 1))), pc.ModelError, "one state but got 2 states"),
+        (lambda m: m.prepare("mass_matrix", batch=3)(np.tile(m.q, (2, 1))), pc.ModelError, "3 states but got 2 states"),
         (lambda m: m.prepare("forward_dynamics")(m.q, m.v, m.v, form="ud"), TypeError, "form"),
         (lambda m: m.prepare("hybrid_dynamics", prescribed="elbow"), pc.ModelError, "elbow"),
         (lambda m: m.prepare("hybrid_dynamics", prescribed=["panda_joint1"] * 2), pc.ModelError, "twice"),
@@ -155,7 +155,7 @@ def test_prepared_hybrid_dynamics_follows_edits(monkeypatch):
         (lambda m: m.prepare("hybrid_dynamics", frame="panda_link7"), pc.EvaluationError, "no option 'frame'; there are prescribed"),
         (lambda m: m.prepare("hybrid_dynamics", batch=-1), pc.EvaluationError, "batch=-1"),
         (lambda m: m.prepare("hybrid_dynamics")(m.q, m.v), TypeError, "takes q, v, tau, vdot; it was given 2"),
-        (lambda m: m.prepare("hybrid_dynamics", batch=3)(m.q, m.v, m.v, m.v), pc.ModelError, "3 states and is given one state"),
+        (lambda m: m.prepare("hybrid_dynamics", batch=3)(m.q, m.v, m.v, m.v), pc.ModelError, "3 states but got one state"),
         (lambda m: m.prepare("hybrid_dynamics")(m.q, np.full(7, np.nan), m.v, m.v), pc.ModelError, "v"),
     ],
 )
@@ -173,7 +173,7 @@ def test_batches_are_counted_by_any_whole_number():
 
 @pytest.mark.parametrize("call", CALLS)
 def test_the_core_takes_what_the_method_takes(call):
-    """But for out= and threads=, and for what leads to other computations."""
+    """Except out= and threads=, and options that lead to other computations."""
     arrays, options = _core.direct_calls()[call]
     method = inspect.signature(getattr(pc.Multibody, call)).parameters
     assert [name for name in method if name in arrays] == list(arrays)

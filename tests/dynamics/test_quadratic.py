@@ -224,7 +224,7 @@ def test_degenerate_models():
     massless.take_warnings()
     with pytest.raises(pc.SingularHingeError, match="hinge1"):
         massless.quadratic_model()
-    inner = pc.chain(2)  # the inner one is: what hangs on it has mass
+    inner = pc.chain(2)  # the inner one is: its outboard body has mass
     inner.bodies["body0"].mass, inner.bodies["body0"].inertia = 0.0, np.zeros((3, 3))
     inner.take_warnings()
     q, v, tau = np.array([0.3, 0.9]), np.array([0.4, -0.2]), np.array([0.1, 0.5])
@@ -239,11 +239,11 @@ def test_degenerate_models():
         (lambda m, f: m.quadratic_model(inputs=["elbow"]), "inputs: no hinge or coordinate"),
         (lambda m, f: m.quadratic_model([0, np.nan]), "q of hinge 'hinge1': entry 0 is nan"),
         (lambda m, f: m.quadratic_model(precision=50), "precision"),
-        (lambda m, f: f.contracted([1.0, 2.0]), "takes numbers (4,), of q.hinge0, q.hinge1, v.hinge0, v.hinge1; it has shape (2,)"),
+        (lambda m, f: f.contracted([1.0, 2.0]), "takes (4,) values, of q.hinge0, q.hinge1, v.hinge0, v.hinge1; it has shape (2,)"),
         (lambda m, f: f.contracted([0, 0, np.inf, 0]), "costate: entry 2 is not finite"),
         (lambda m, f: f.discrete(-1.0), "dt=-1: a step is a positive number of seconds"),
         (lambda m, f: f.discrete([0.1, 0.2]), "dt takes one number"),
-        (lambda m, f: f.discrete(0.1, "dopri5"), "integrator='dopri5': steps to second order are of 'euler', 'semi-impl"),
+        (lambda m, f: f.discrete(0.1, "dopri5"), "integrator='dopri5': steps to second order exist for 'euler', 'semi-impl"),
         (lambda m, f: f.discrete(0.1, ["euler"]), "integrator=['euler']: steps to second order"),
         (lambda m, f: f.discrete(0.1).discrete(0.1), "is discrete already, with a step of 0.1 s"),
     ],

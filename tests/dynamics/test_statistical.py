@@ -102,16 +102,16 @@ def test_refusals():
         model.equipartition([0, 0], -1.0)
     with pytest.raises(pc.EvaluationError, match="boltzmann=inf"):
         model.fixman_torque([0, 0], boltzmann=np.inf)
-    with pytest.raises(pc.EvaluationError, match="count is of one state"):
+    with pytest.raises(pc.EvaluationError, match="count needs one state"):
         model.equipartition([[0, 0]], count=3)
-    with pytest.raises(pc.EvaluationError, match="count=-1: how many draws"):
+    with pytest.raises(pc.EvaluationError, match="count=-1: the number of draws"):
         model.equipartition([0, 0], count=-1)
     with pytest.raises(pc.ModelError, match="takes 2 numbers"):
         model.equipartition([0, 0, 0])
     for q in ("bent", {}, [1j, 0]):
         with pytest.raises(pc.ModelError, match="q is "):
             model.equipartition(q)
-    with pytest.raises(pc.ModelError, match="seed: a whole number, not 'dice'"):
+    with pytest.raises(pc.ModelError, match="seed must be a whole number, not 'dice'"):
         model.equipartition([0, 0], rng="dice")
     for call in (model.equipartition, model.fixman_potential, model.fixman_torque):
         with pytest.raises(pc.EvaluationError, match=r"temperature=1e\+200 by boltzmann=1e\+200 is inf J: take other units"):

@@ -22,7 +22,7 @@ def inertial(inside):
 
 
 def text_of(path, text, **options):
-    """What loading the text says."""
+    """Return the error of loading the text."""
     path.write_text(text)
     with pytest.raises(pc.ModelError) as caught:
         pc.load(path, **options)
@@ -121,7 +121,7 @@ BAD = {
     "zero quaternion": (
         [BASE, ARM, joint('<origin quat_xyzw="0 0 0 0"/>')],
         5,
-        "joint 'elbow': <origin> quat_xyzw has length 0; no rotation is 0 0 0 1",
+        "joint 'elbow': <origin> quat_xyzw has length 0; the identity is 0 0 0 1",
     ),
     "rpy and quaternion": (
         [BASE, ARM, joint('<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/>')],

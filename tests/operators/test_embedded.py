@@ -109,7 +109,7 @@ def test_written_out(name):
 
 
 def test_bodies_and_coordinates_of_each_set():
-    """Overlapping loops are one node; what is on two roots is, too; what hangs outboard is no part of it."""
+    """Overlapping loops form one node, and so do loops on two roots; outboard bodies are not part of it."""
     names = two_loops().soa.embedded()._source.body_names
     assert names == ["body0+body1+body2+body3+body4+body5", "body6+body7+body8"]
     source = spatial().soa.embedded()._source
@@ -178,7 +178,7 @@ def test_refusals():
     by_rocker = model.soa.embedded([third])
     with pytest.raises(pc.EvaluationError, match=f"do not follow from '{third}', which are no .*; '({first}|{second})' are"):
         by_rocker.MM.at(dead).dense()
-    with pytest.raises(pc.ModelError, match="do not tell where the others are"):
+    with pytest.raises(pc.ModelError, match="do not determine the others"):
         model.soa.embedded([third], q=dead)
     with pytest.raises(pc.EvaluationError, match="row 'closure: about x' hangs on the others, and is broken"):
         soa.MM.diff(model.hinges[second].symbol("axis", "x")).dense()
@@ -188,7 +188,7 @@ def test_refusals():
         bars.soa.embedded(q=[0, 0, np.pi])
     with pytest.raises(pc.ModelError, match="takes 3 finite numbers"):
         embedded_accelerations(model, tau=[np.nan, 0, 0])
-    with pytest.raises(pc.ModelError, match="no multibody model"):
+    with pytest.raises(pc.ModelError, match="not a complete multibody model"):
         soa.embedded()
 
 
