@@ -110,7 +110,10 @@ def _run(
     if steps is not None:
         ends = len(steps["t"])
         steps = {name: x.reshape((ends, *(widths[name][1:] if name in widths else x.shape[1:]))) for name, x in steps.items()}
-    run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=told["statistics"])
+    statistics = told["statistics"]
+    if "switches" in statistics:
+        statistics["switches"] = [(at, method) for at, method in statistics["switches"]]
+    run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=statistics)
     run.__dict__["_along"] = {
         **along,
         "forces": along["forces"].reshape(len(about["effects"]), n, nv),

@@ -306,7 +306,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         q=None,
         v=None,
         *,
-        integrator: str = "dopri5",
+        integrator: str = "auto",
         rtol: float = 1e-9,
         atol: float = 1e-12,
         step: float | None = None,
@@ -325,10 +325,10 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         ----------
         T : s
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls; prescribed coordinates are their motion's
-        integrator : {"dopri5", "auto", "dop853", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "DOP853", "cvode", ...}
-            docs/simulation.md says when to take which. "rosenbrock4" is for stiff scenes, and "auto" takes it where the motion is stiff;
-            "variational2" and "variational4" are for long ones; "semi-implicit-euler" (order 1) takes implicit damping and stiffness into
-            D: stable for any, while explicit stiffness beside them bounds the step.
+        integrator : {"auto", "dopri5", "dop853", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "DOP853", "cvode", ...}
+            docs/simulation.md says when to take which. "auto" is "dopri5", bit for bit, until the motion becomes stiff, and "rosenbrock4"
+            as long as it is; "variational2" and "variational4" are for long runs; "semi-implicit-euler" (order 1) takes implicit damping
+            and stiffness into D: stable for any, while explicit stiffness beside them bounds the step.
         rtol, atol : tolerances on the error of one step, per component of q, v and the effects' own states
         step : s
             Of one-size steps; the first step of the others, chosen if left out.

@@ -26,7 +26,7 @@ class Viewed:
         -------
         View
             A notebook shows it in its cell; `address` is what a browser opens, `close()` ends it. It goes on by `run_options` of the scene
-            ("integrator", "rtol", "atol", "step"), by dopri5 with rtol 1e-7 where they say nothing.
+            ("integrator", "rtol", "atol", "step"), by "auto" with rtol 1e-7 where they say nothing.
 
         Raises
         ------

@@ -119,7 +119,7 @@ def test_after_an_interrupt_or_an_error():
 def test_what_does_not_fit(tmp_path):
     scene = CASES["damped"]()
     checkpoint = scene.simulate(0.1).checkpoint()
-    assert repr(checkpoint) == f"<checkpoint of 'spinning' at {checkpoint.t:g} s, integrator 'dopri5'>"
+    assert repr(checkpoint) == f"<checkpoint of 'spinning' at {checkpoint.t:g} s, integrator 'auto'>"
     with pytest.raises(
         pc.ModelError, match="the checkpoint is of effects gravity, spring, damping, torque_source; this scene has gravity, spring"
     ):

@@ -228,12 +228,9 @@ def test_a_run_counts_its_passes(arm):
     run = scene.simulate(0.1, integrator="rk4", step=0.01)
     assert run.statistics["evaluations"] == 40
     assert run.statistics["passes"] == {"poses": 40, "twists": 40, "damping": 40, "wrench": 40, "accelerations": 40}
-    assert scene.simulate(0.1, integrator="rk4", step=0.01, energy=False).statistics["passes"] == {
-        "poses": 40,
-        "damping": 40,
-        "wrench": 40,
-        "accelerations": 40,
-    }
+    # Without works, also once at the start, where the stability of fixed steps is checked.
+    plain = scene.simulate(0.1, integrator="rk4", step=0.01, energy=False)
+    assert plain.statistics["passes"] == {"poses": 41, "damping": 41, "wrench": 41, "accelerations": 41}
 
 
 def test_the_plan_in_words(arm):
