@@ -176,6 +176,23 @@ def test_it_plays(browser, film, dark, tmp_path):
         assert page.asked == [film.as_uri()]  # nothing but itself
 
 
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_a_page_in_a_cell_has_the_theme_of_its_notebook(browser, run, tmp_path, dark):
+    """JupyterLab's body has its theme, which a page takes, also against the system's mode, and again when it changes."""
+    cell = tmp_path / "cell.html"
+    body = f"<body data-jp-theme-light='{str(not dark).lower()}'>{run.to_html()._repr_html_()}</body>"
+    cell.write_text(f"<!DOCTYPE html><html lang='en'><meta charset='utf-8'><link rel='icon' href='data:,'>{body}</html>", encoding="utf-8")
+    colours = {True: ["rgb(27, 27, 29)", "#1b1b1d"], False: ["rgb(255, 255, 255)", "#ffffff"]}
+    with opened(browser, cell.as_uri(), dark=not dark) as page:
+        (frame,) = page.frames[1:]
+        frame.wait_for_selector("#figure")
+        seen = "[getComputedStyle(document.body).backgroundColor, colourOf('--page')]"
+        assert frame.evaluate(seen) == colours[dark]
+        page.evaluate(f"document.body.dataset.jpThemeLight = '{str(dark).lower()}'")
+        frame.wait_for_function(f"{seen}[0] === '{colours[not dark][0]}'")
+        assert frame.evaluate(seen) == colours[not dark]
+
+
 def test_the_slider_and_the_plot_choose_the_time(browser, film):
     with opened(browser, film.as_uri()) as page:
         first = pixels(page)
