@@ -95,7 +95,7 @@ class Run(Motion, Renamed):
         """The coordinates that left limits of the model which no `Limits` effect of the scene held, in the model's order.
 
         Each has `coordinate`, `limit`, `upper`, `first` (s) and `farthest`. Looked for at the ends of all steps, or at the rows where the
-        run kept no steps. Empty for a run that was read from a file without its scene. Cost: O(K N), once.
+        run kept no steps. A file keeps them. Cost: O(K N), once.
         """
         if "stops" not in self._about:
             return []
