@@ -136,10 +136,10 @@ def test_names_are_no_markup():
 def test_refusals(run, tmp_path):
     for arguments, options, words in (
         (("run.gif",), {}, "ends in .html"),
-        ((), {"fps": 0}, "fps=0: a positive number"),
-        ((), {"speed": float("inf")}, "speed=inf: a positive number"),
-        ((), {"fps": 1e6}, "100 at most go into a page; a lower fps"),
-        ((None, "voltage"), {}, "no picture is called 'voltage'"),
+        ((), {"fps": 0}, "fps=0: give a positive number"),
+        ((), {"speed": float("inf")}, "speed=inf: give a positive number"),
+        ((), {"fps": 1e6}, "a page holds at most 100 MB: use a lower fps"),
+        ((None, "voltage"), {}, "no plot is called 'voltage'"),
     ):
         with pytest.raises(pc.EvaluationError, match=re.escape(words)):
             run.to_html(*arguments, **options)
