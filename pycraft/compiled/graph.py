@@ -1,8 +1,8 @@
 """Graphs of operations: a tape of the core (cpp/lanes/tape.h) with fewer operations, before it becomes straight-line code.
 
-A node is a constant, an input, or an operation on nodes, and is identified by its number. Operations on constants are computed, sums with zero
-and products with zero or one are dropped, and equal operations are one node. A division becomes a product with the reciprocal of the divisor,
-which is computed once and rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one.
+A node is a constant, an input, or an operation on nodes, and is identified by its number. Operations on constants are computed, sums with
+zero and products with zero or one are dropped, and equal operations are one node. A division becomes a product with the reciprocal of the
+divisor, which is computed once and rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one.
 
 Dropping 0 x is exact for finite x alone; the code that is built of a graph checks that its inputs and results are finite (source.py).
 """

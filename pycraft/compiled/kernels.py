@@ -45,7 +45,7 @@ def frame_graph(model: Any, call: str, frame: str) -> tuple[Graph, np.ndarray]:
 
 
 def states_to_record(model: Any) -> list[Any]:
-    """Return states to record at, on the loops of the model: near its own state, then others. Decisions at special states are unlike all others."""
+    """Return states to record at, on the loops of the model: near its own state, then others; special states decide as no others do."""
     rng = np.random.default_rng(0)
     near = model.integrate(model.q, rng.uniform(-BESIDE, BESIDE, model.nv))
     starts = [(near, rng.uniform(-1, 1, model.nv)), *((s.q, s.v) for s in (model.random_state(k) for k in (1, 2)))]

@@ -225,7 +225,7 @@ def never(t, state):
         (lambda scene: scene.add(E.TorqueSource(lambda t: 0.1 * t, hinges="boom")), {}, "effect 'torque_source' is written in Python"),
         (lambda scene: scene.add(E.Prescribed("boom", lambda t: (0.1 * t, 0.1, 0.0))), {}, "effect 'prescribed' is written in Python"),
         (lambda scene: scene, {"events": never}, "the runs look for events"),
-        (lambda scene: scene, {"integrator": "scipy:RK45"}, "integrator 'scipy:RK45' is another package's"),
+        (lambda scene: scene, {"integrator": "scipy:RK45"}, "integrator 'scipy:RK45' belongs to another package"),
         (lambda scene: scene, {"integrator": "variational2", "step": 0.01}, "integrator 'variational2' solves for momenta"),
         (lambda scene: pc.Scene(scene.model, precision="extended").add(E.Gravity()), {}, "packs are of states in double precision"),
         (lambda scene: pc.Scene(scene.model, form="ud").add(E.Wrench("tip", [1] * 6)), {}, "packs have one wrench for all states"),
