@@ -70,7 +70,7 @@ def at_states(model, expression, request, made, count=3):
 @pytest.mark.parametrize("wanted", EXPRESSIONS)
 @pytest.mark.parametrize("tree", TREES)
 def test_graphs_are_the_plans(tree, wanted):
-    """To the rounding of sums over bodies times the condition of what is inverted, and at every state that guards admit, all but of eliminations."""
+    """Graphs agree with plans to the rounding of sums over bodies times the condition; guards hold everywhere, except in eliminations."""
     model = TREES[tree]()
     model.gravity = (0.3, -9.0, 1.0)
     make, request = EXPRESSIONS[wanted]
@@ -243,7 +243,7 @@ OF_LOOPS = {
 
 @pytest.mark.parametrize("name", OF_LOOPS)
 def test_loops_compile_as_functions_of_the_state(name):
-    """At most states on the loops; at others, and at states off them where loops are embedded, a guard does not hold and the plan answers."""
+    """Guards hold at most states on the loops; at others, and off the loops, the plan answers."""
     model = closed_four_bar()
     embedded = model.soa.embedded(["crank"])
     expression, request = OF_LOOPS[name](embedded, model.soa)
