@@ -315,7 +315,6 @@ CHANGES = {
         ),
         ("products lose a sign", "return product if None not in negatives else self._negate(product)", "return product"),
         ("any factor is a power of two", " and math.log2(factor) == int(math.log2(factor)):", ":"),
-        ("guards are not kept", "            self.guards.append(node)\n", "            pass\n"),
     ],
     "pycraft/compiled/source.py": [
         ("one angle for all", "self.early.index(taken[0])", "0"),
@@ -327,15 +326,10 @@ CHANGES = {
         ),
     ],
     "pycraft/compiled/expressions.py": [
-        ("gravity turned round", '*(-describe(source)["gravity"])', '*(describe(source)["gravity"])'),
-        ("pivots are not guarded", "graph.guard(pivot if mirrored else abs(pivot), _FAINT * self.scale)", "pass"),
+        ("velocities are no argument", '*([("v", self.model.nv)] if "v" in read else [])', ""),
     ],
-    "pycraft/compiled/kinematics.py": [
-        ("rows of H change the wrong way", "[crm(h) @ moving for h in own]", "[-(crm(h) @ moving) for h in own]"),
-        ("a screw without its pitch", 'cross(c, a) + a * subhinge["pitch"] if kind', "cross(c, a) if kind"),
-    ],
-    "pycraft/compiled/frames.py": [
-        ("a node's own frame left out", "[*path, own], _STILL", "path, _STILL"),
+    "pycraft/compiled/tapes.py": [
+        ("guards are not kept", "    for truth, holds in guards:\n", "    for truth, holds in []:\n"),
     ],
     "pycraft/compiled/compiled.py": [
         ("edits go unnoticed", "made.model is not None and _numbers_of(made.model) != numbers", "False"),
