@@ -210,7 +210,7 @@ def test_letters_known_at_one_state_alone_are_refused_by_name():
         with pytest.raises(pc.EvaluationError, match=f"compile\\(\\) cannot record .*{what}.*at\\(q\\)"):
             op.compile()
     for op in (bars.soa.Q, bars.soa.Q @ bars.soa.MM.inv() @ bars.soa.Q.T):
-        with pytest.raises(pc.EvaluationError, match="no recursion is written for Q, rows of loops"):
+        with pytest.raises(pc.EvaluationError, match="no recursion is written for Q, the rows of loops"):
             op.compile()
 
 
