@@ -302,7 +302,7 @@ def _check_same_spaces(lhs: Any, rhs: Any) -> None:
 def as_text(statement: Any) -> str:
     """Return a statement given as text. Raises EvaluationError for other objects."""
     if not isinstance(statement, str):
-        raise _core.EvaluationError(f"a statement must be text, such as 'ψ⁻¹ = φ⁻¹ + KH', not {statement!r:.80}")
+        raise _core.EvaluationError(f"a statement is text, such as 'ψ⁻¹ = φ⁻¹ + KH', not {statement!r:.80}")
     return statement
 
 
