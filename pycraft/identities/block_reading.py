@@ -1,12 +1,12 @@
 """Statements by block: `Ω(i,j) = ψ*(c,i)Υ(c)ψ(c,j), c the closest common ancestor of i and j`, as text.
 
-An operator with bodies behind it is one of its blocks: X(i,j) leads from body j to body i, X(k) of a block-diagonal operator is X(k,k),
-x(k) of a vector its entries of body k. As in the book X*(i,j) is the transpose of X(i,j); D⁻¹(k) is D(k)⁻¹. Bodies are small letters from c
-to z, ℘(k), 𝒫(k) or parent(k), or a body's own name; on serial chains, numbered from the tip as in the book, k+1 is the parent of k and k-1
-what it carries. Σ_{j∈C(k)} or Σ_{j∈children(k)} sums the product behind it over the children of k, Σ_{j∈path(k)} over k and the bodies
-between it and the base, Σ_{j∈outboard(k)} over k and all that it carries, Σ_j over all bodies; ∏ multiplies numbers so. Behind a comma or
-"where" stands which bodies are meant, see `block_relations`, and letters by block: S(k) = E(k), said of every k. [X](i,j) is a block of an
-expression of operators.
+An operator followed by bodies is one of its blocks: X(i,j) maps from body j to body i, X(k) of a block-diagonal operator is X(k,k),
+x(k) of a vector are its entries of body k. As in the book, X*(i,j) is the transpose of X(i,j); D⁻¹(k) is D(k)⁻¹. Bodies are small letters
+from c to z, ℘(k), 𝒫(k) or parent(k), or a body's own name; on serial chains, numbered from the tip as in the book, k+1 is the parent of k
+and k-1 its child. Σ_{j∈C(k)} or Σ_{j∈children(k)} sums the following product over the children of k, Σ_{j∈path(k)} over k and the bodies
+between it and the base, Σ_{j∈outboard(k)} over k and all bodies outboard of it, Σ_j over all bodies; ∏ multiplies numbers likewise. A
+comma or "where" is followed by relations of bodies, see `block_relations`, and letters by block: S(k) = E(k), for every k. [X](i,j) is a
+block of an expression of operators.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SUFFIX = r"(?:\^\*|\^-1|\^T|'|\*)?"
 
 @dataclass(frozen=True)
 class SumOver(Node):
-    """Σ inner, or ∏ inner, over the children of a body, its path to the base or all outboard of it; over all bodies where `of` is empty."""
+    """Σ inner, or ∏ inner, over the children of a body, its path to the base or all outboard of it; over all bodies if `of` is empty."""
 
     index: str
     of: str
@@ -61,7 +61,7 @@ class Entry(Node):
 
 @dataclass(frozen=True)
 class BlockStatement:
-    """Two sides, the letters that run over bodies, and which of them are meant."""
+    """Two sides, the letters that run over bodies, and their relations."""
 
     text: str
     formula: Formula
@@ -71,7 +71,7 @@ class BlockStatement:
 
     @property
     def understood(self) -> str:
-        """How it was read."""
+        """The statement as it was read."""
         meant = ", ".join(
             [*map(str, self.relations), *(f"{d.name} := {shown_text(d.what)}" for d in self.definitions if self._uses(d.name))]
         )
@@ -81,20 +81,20 @@ class BlockStatement:
         return any(isinstance(node, Letter) and node.name == name for side in self.formula for node in parts(side))
 
     def beside(self, what: str) -> set[str]:
-        """The letters of bodies of which the parent, or the child, is spoken of: bodies that have one."""
+        """Letters of bodies whose parent or child occurs in the statement, so they must have one."""
         found = {a for side in self.formula for node in parts(side) if isinstance(node, (Letter, Entry)) for a in node.arguments}
         return {a[len(what) + 1 : -1] for a in found if a.startswith(f"{what}(")}
 
     @property
     def of_chains(self) -> bool:
-        """Whether bodies are numbered along a serial chain: k+1 or k-1 stand in it."""
+        """True if bodies are numbered along a serial chain: the statement contains k+1 or k-1."""
         return bool(re.search(rf"(?<![\w)]){VARIABLE}\s*[+-]\s*1(?!\w)", spelled(self.text).text)) and bool(
             self.beside("child") | self.beside("parent")
         )
 
 
 def is_by_block(text: str, bodies: Iterable[str] = (), own: Iterable[str] = ()) -> bool:
-    """Whether blocks of bodies stand in a text; `own` are letters that are defined for it, and bodies are none of them."""
+    """Return True if a text contains blocks of bodies; `own` are letters defined for it, which are not bodies."""
     source = spelled(_divided(text)[0]).text
     found = _block(tuple(bodies), frozenset(own)).finditer(source)
     return _entry(tuple(bodies)).search(source) is not None or any(
@@ -103,28 +103,28 @@ def is_by_block(text: str, bodies: Iterable[str] = (), own: Iterable[str] = ()) 
 
 
 def says_by_block(text: str, bodies: Iterable[str] = ()) -> bool:
-    """`is_by_block`, of a statement with the definitions around it."""
+    """Return `is_by_block` of a statement with the definitions around it."""
     named = [*bodies]
     definitions, claim = divided(text, lambda said, own: is_by_block(said, named, own))
     return is_by_block(claim, named, [d.name for d in definitions])
 
 
 def refuse_by_block(text: str, own: Iterable[str] = ()) -> None:
-    """Raises ParseError for a statement by block: what reads operators alone says so."""
+    """Raise ParseError for a statement by block, where only operators are supported."""
     if is_by_block(text, own=own):
         raise ParseError(
-            f"{text!r} is a statement by block: pycraft.check evaluates it for every choice of bodies, pycraft.prove derives those of "
-            "every body, its parent and its children; statements by block are not mapped or repaired"
+            f"{text!r} is a statement by block: pycraft.check evaluates it for every choice of bodies, pycraft.prove derives statements "
+            "for every body, its parent and its children; truth and repair do not support statements by block"
         )
 
 
 def read_by_block(text: str, bodies: Iterable[str] = (), before: Iterable[Definition] = ()) -> BlockStatement:
-    """The statement; `before` are definitions that do not stand in the text.
+    """Return the statement; `before` are definitions outside the text.
 
     Raises
     ------
     ParseError
-        It does not read as one; the place is shown.
+        The text is not one; the message shows the place.
     """
     definitions, claim = divided(text, lambda said, own: is_by_block(said, bodies, own))
     definitions = [*before, *definitions]
@@ -135,7 +135,7 @@ def read_by_block(text: str, bodies: Iterable[str] = (), before: Iterable[Defini
         of_body, meant = _letters_of_bodies(meant)
         own |= {*of_body}
         if re.search(r"\.T|@", source.text) and re.search(r"\)\s*\*\s*\w", source.text):
-            raise Misread("with .T and @ a * says two things: write @ to multiply", source.text.index("*"))
+            raise Misread("a * is ambiguous beside .T and @: write @ to multiply", source.text.index("*"))
         sides = [(m.start(), m.end()) for m in re.finditer(r"==?", source.text)]
         if len(sides) != 1:
             raise ParseError(f"{'one side' if not sides else 'more than two sides'}; a statement is lhs = rhs")
@@ -189,7 +189,7 @@ def _with_letter(node: Node, name: str, index: str, inner: Node) -> Node:
 
 
 def _renamed(node: Node, index: str, body: str) -> Node:
-    """What is said of one body, said of another."""
+    """Return a formula of one body for another body."""
     arguments = getattr(node, "arguments", ())
     if any(index in a for a in arguments) and not re.fullmatch(VARIABLE, body) and any(a != index for a in arguments if index in a):
         raise ParseError(f"{written(node)} of {body}: bodies two hinges away have no names here")
@@ -207,7 +207,7 @@ def _rebuilt(node: Node, children: list[Node]) -> Node:
 
 
 def shown(node: Node) -> str:
-    """A side as the book prints it."""
+    """Return a side in the book's notation."""
     if isinstance(node, Entry):
         return f"[{shown(node.inner)}]({', '.join(node.arguments)})"
     if isinstance(node, SumOver):
@@ -227,7 +227,7 @@ def shown(node: Node) -> str:
 
 
 def _divided(text: str) -> tuple[str, str]:
-    """The statement, and what is said behind its first comma outside of brackets, or behind "where"."""
+    """Return the statement, and the text after its first comma outside brackets, or after "where"."""
     depth = 0
     for i, c in enumerate(text):
         if i and text[i - 1] == "\\" and c in ",;:{}":
@@ -252,7 +252,7 @@ def _body(bodies: tuple[str, ...]) -> str:
 
 @lru_cache(maxsize=32)
 def _block(bodies: tuple[str, ...], defined: frozenset[str] = frozenset()) -> re.Pattern[str]:
-    """A letter with bodies, an optional suffix between; functions and the letters that take other arguments are passed over."""
+    """Match a letter with bodies, with an optional suffix between; functions and letters with other arguments are skipped."""
     from .vocabulary import FUNCTIONS
 
     body = _body(bodies)
@@ -330,7 +330,7 @@ def _bare(argument: str) -> str:
 
 
 def _free(sides: Iterable[Node], bodies: set[str]) -> tuple[str, ...]:
-    """The letters of bodies that no sum runs over, in order."""
+    """Return the letters of bodies without a sum over them, in order."""
 
     def walk(node: Node, bound: frozenset[str]) -> Iterator[str]:
         if isinstance(node, SumOver):

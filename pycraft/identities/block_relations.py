@@ -1,4 +1,4 @@
-"""Which bodies a statement by block is about: `i above j`, `c the closest common ancestor of i and j`, `j child of k`, ..."""
+"""Relations of the bodies in a statement by block: `i above j`, `c the closest common ancestor of i and j`, `j child of k`, ..."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from itertools import combinations, product
 from .vocabulary import Misread
 
 Test = Callable[[Sequence[int], "tuple[int, ...]"], bool]
-"""Of the parents of all bodies, and the bodies that the letters of a relation stand for."""
+"""Test of a relation, given the parents of all bodies and the bodies of its letters."""
 
 
 def ancestors(parents: Sequence[int], k: int) -> list[int]:
-    """k and the bodies between it and the base, outermost first."""
+    """Return k and the bodies between it and the base, outermost first."""
     found = []
     while k >= 0:
         found.append(k)
@@ -55,7 +55,7 @@ _TESTS: dict[str, Test] = {
 
 @dataclass(frozen=True)
 class Relation:
-    """What is said of the bodies that some letters stand for."""
+    """A relation between the bodies of some letters."""
 
     says: str
     letters: tuple[str, ...]
@@ -108,7 +108,7 @@ _WORDS_IN_LATEX = re.compile(r"\\(?:text|mathrm|textrm)\s*\{([^{}]*)\}|\\q?quad(
 
 
 def relations(text: str, letters: Sequence[str], begin: int = 0) -> Iterator[Relation]:
-    """What is said behind a statement, which begins at a character of the typed text. Raises Misread."""
+    """Read the relations after a statement, which begin at a character of the typed text. Raises Misread."""
     at = 0
     text = _WORDS_IN_LATEX.sub(lambda m: (" " * m[0].index(m[1]) + m[1]).ljust(len(m[0])) if m[1] else " " * len(m[0]), text)
     while text[at:].strip():
@@ -126,7 +126,7 @@ def relations(text: str, letters: Sequence[str], begin: int = 0) -> Iterator[Rel
             found = _BETWEEN.match(text, at)
             if found is None or found.end() == at:
                 raise Misread(
-                    f"not understood at {text[at : at + 24].strip()!r}; what may be said is, for one, 'i above j', "
+                    f"not understood at {text[at : at + 24].strip()!r}; write relations such as 'i above j', "
                     "'i and j not on one path', 'p parent of k', 'c the closest common ancestor of i and j'",
                     begin + at,
                 )
@@ -134,7 +134,7 @@ def relations(text: str, letters: Sequence[str], begin: int = 0) -> Iterator[Rel
 
 
 def choices(letters: Sequence[str], parents: Sequence[int], said: Iterable[Relation], fixed: dict[str, int]) -> Iterator[dict[str, int]]:
-    """The bodies that the letters may stand for."""
+    """Yield the bodies allowed for the letters."""
     said = list(said)
     for bodies in product(range(len(parents)), repeat=len(letters)):
         chosen = {**fixed, **dict(zip(letters, bodies, strict=True))}
@@ -143,7 +143,7 @@ def choices(letters: Sequence[str], parents: Sequence[int], said: Iterable[Relat
 
 
 def standard(letters: Sequence[str]) -> list[Relation]:
-    """What may make a statement true that is not true of all bodies; the widest first."""
+    """Return relations under which a statement may be true that is not true for all bodies, widest first."""
     pairs = [Relation(says, pair) for says in list(_TESTS)[:8] for pair in combinations(letters, 2)]
     closest = [Relation(_CLOSEST, (c, *[x for x in letters if x != c])) for c in letters if len(letters) == 3]
     return closest + sorted(pairs, key=lambda r: "same" not in r.says)

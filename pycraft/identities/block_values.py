@@ -1,7 +1,7 @@
-"""Values of statements by block: every letter's matrix once per precision, its blocks, and what rounding made of them.
+"""Values of statements by block: every letter's matrix once per precision, its blocks, and their rounding errors.
 
-Each value carries a bound on its error: a letter's own as in `bounds`, of its whole matrix; of products, sums and inverses what those make
-of it, to first order, and the rounding of the few operations on blocks themselves.
+Each value carries a bound on its error: for a letter the bound of its whole matrix, as in `residual_bounds`; for products, sums and
+inverses the propagated bound, to first order, plus the rounding of the few operations on blocks themselves.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from .residual_bounds import EPSILON, Roundings
 from .vocabulary import ParseError
 
 Place = tuple[str, str]
-"""A space, and the letter of the body whose part of it is meant."""
+"""A space, and the letter of the body that selects a part of it."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """A block, where it leads to and from (None of a number; "any" of an I), and the bound on its error in the Frobenius norm."""
+    """A block, its codomain and domain (None for a number; "any" for an I), and the bound on its error in the Frobenius norm."""
 
     array: Any
     codomain: Place | None
@@ -39,7 +39,7 @@ class Block:
     error: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "array", np.asarray(self.array))  # arithmetic makes scalars of numbers
+        object.__setattr__(self, "array", np.asarray(self.array))  # arithmetic turns numbers into scalars
 
     @property
     def norm(self) -> float:
@@ -63,7 +63,7 @@ class Blocks:
         self.growth = 1.0
 
     def _matrix(self, name: str) -> tuple[Any, Any, float]:
-        """(the operator, its matrix, the bound on its error)."""
+        """Return the operator, its matrix, and the bound on its error."""
         if name not in self._matrices:
             operator = self._operator(name)
             bound = self._at.bind(operator, self.precision)
@@ -82,11 +82,11 @@ class Blocks:
     def _operator(self, name: str) -> Any:
         made = self._statements.letter(name, self._definitions)
         if not isinstance(made, _core.Operator) or made.domain is None:
-            raise ParseError(f"{name} is no operator between two spaces: it has no blocks")
+            raise ParseError(f"{name} is not an operator between two spaces, so it has no blocks")
         return made
 
     def of(self, letter: Letter, bodies: dict[str, int]) -> Block:
-        """The block of a letter; raises ParseError where it has none."""
+        """Return the block of a letter. Raises ParseError if it has none."""
         defined = {d.name for d in self._definitions}
         if letter.name == "I" and "I" not in defined:
             return Block(np.ones((1, 1)), ANY, ANY)
@@ -131,7 +131,7 @@ class Blocks:
         name = next((n for n, _, k in self._operators.V.blocks if k == body), None)
         found = next((where for n, where, k in space.blocks if (k == body if own else n == name)), None)
         if found is None:
-            raise ParseError(f"{shown(node)}: {space.name} is not cut into bodies")
+            raise ParseError(f"{shown(node)}: {space.name} is not divided among bodies")
         return found
 
     def _body(self, argument: str, bodies: dict[str, int]) -> int:
@@ -163,12 +163,12 @@ _DUAL = {"V": "F", "F": "V"}
 
 
 def value(node: Node, blocks: Blocks, bodies: dict[str, int]) -> Block:
-    """The value of a side for these bodies.
+    """Return the value of a side for these bodies.
 
     Raises
     ------
     SpaceError
-        Blocks that do not meet: the one ends at another body, or in another space, than the next begins.
+        Blocks that do not match: one ends at another body, or in another space, than the next one begins.
     SingularOperatorError
         An inverse that does not exist.
     """
@@ -206,7 +206,7 @@ def value(node: Node, blocks: Blocks, bodies: dict[str, int]) -> Block:
             return _inverse(value(inner, blocks, bodies), inner, eps)
         case Call(function=("trace" | "logdet" | "det") as function, inner=inner):
             return _number(function, value(inner, blocks, bodies), inner, eps)
-    raise ParseError(f"{shown(node)}: of blocks there are products, sums, transposes, inverses, traces and ln det")
+    raise ParseError(f"{shown(node)}: blocks support products, sums, transposes, inverses, traces and ln det")
 
 
 def _dual(place: Place | None) -> Place | None:
@@ -250,7 +250,7 @@ def _sum(values: list[Block], signs: Sequence[int], node: Node, eps: float) -> B
 
 
 def _eliminated(a: Any) -> Any:
-    """The inverse of a block, by elimination with partial pivoting, in the block's own numbers."""
+    """Return the inverse of a block, by elimination with partial pivoting, in the block's own scalar."""
     n = len(a)
     work = np.concatenate([a, np.eye(n).astype(a.dtype) if a.dtype != object else np.eye(n).astype(int).astype(object)], axis=1)
     for k in range(n):
@@ -266,7 +266,7 @@ def _eliminated(a: Any) -> Any:
 
 
 def _pivots(a: Any) -> list[Any]:
-    """Of elimination with partial pivoting, in the block's own numbers; their product is the determinant."""
+    """Return the pivots of elimination with partial pivoting, in the block's own scalar; their product is the determinant."""
     work, pivots = a.copy(), []
     for k in range(len(work)):
         row = k + int(np.argmax([abs(x) for x in work[k:, k]]))
@@ -296,7 +296,7 @@ def _number(function: str, x: Block, inner: Node, eps: float) -> Block:
     if function == "trace":
         return Block(np.asarray(sum(x.array[k, k] for k in range(n))), None, None, float(np.sqrt(n)) * (x.error + eps * x.norm))
     pivots = _pivots(x.array)
-    inverse = np.linalg.inv(np.asarray(x.array, float))  # of which the bound takes the size alone
+    inverse = np.linalg.inv(np.asarray(x.array, float))  # the bound uses only its size
     if function == "det":
         size = np.asarray(math.prod(pivots[1:], start=pivots[0]) if n else 1.0)
         return Block(size, None, None, abs(float(size)) * _norm(inverse) * (x.error + eps * n * x.norm))

@@ -1,6 +1,6 @@
 """The book's reading of statements: juxtaposition multiplies, a postfix star transposes, tr ΥM and √D need no parentheses.
 
-The numbers in front of a product scale the whole of it: 2 D D is 2 (D D), as it is shown.
+Numbers in front of a product scale the whole product: 2 D D is 2 (D D), as displayed.
 """
 
 from __future__ import annotations
@@ -58,12 +58,12 @@ NAME.2: /%(names)s/
 
 
 def read_book(source: str, vocabulary: Vocabulary) -> list[Any]:
-    """The sides of a statement, one or two.
+    """Return the sides of a statement, one or two.
 
     Raises
     ------
     Misread
-        The text is no statement; it says at which character.
+        The text is not a statement; the error names the character.
     """
     if tower := re.search(r"(?<=\^)\d+\s*\^\s*-?\d", source):
         raise Misread("a power of a power needs parentheses", tower.start())
@@ -80,7 +80,7 @@ def read_book(source: str, vocabulary: Vocabulary) -> list[Any]:
 
 
 def _stumble(source: str, at: int, vocabulary: Vocabulary) -> Misread:
-    """What to say of the text at which the grammar gave up."""
+    """Return the error for the text at which the grammar stopped."""
     while at > 0 and re.match(r"\\?\w", source[at - 1 : at + 1]):  # the whole word
         at -= 1
     rest = source[at:].lstrip()

@@ -26,23 +26,23 @@ from .vocabulary import is_operator
 
 
 def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: str | int = "extended", progress: Any = True) -> Report:
-    """Check every theorem on the model of `operators`, at the present state and at `states` random ones.
+    """Check every theorem on the model of `operators`, at the present state and at `states` random states.
 
-    A theorem holds if its residual falls with epsilon and is below a derived bound that decides (see `judge`): in a scalar wider than
-    double, and in wider ones where that decides nothing, up to 100 digits. Outside its hypotheses it is evaluated all the same and
-    reported as expected to fail, with how much and which hypothesis.
+    A theorem holds if its residual falls with epsilon and is below a derived, decisive bound (see `judge`): in a scalar wider than
+    double, and in still wider ones if that is not decisive, up to 100 digits. Outside its hypotheses a theorem is also evaluated, and
+    reported as expected to fail, with its residual and the violated hypothesis.
 
     Parameters
     ----------
-    states : random states, drawn from `seed`
-    precision : the first scalar beside double, "extended", "quad", 50 or 100 digits
-    progress : True: a bar in a terminal or notebook if it takes more than a second; False: none; a function: called with each theorem's
+    states : number of random states, drawn from `seed`
+    precision : the first scalar after double, "extended", "quad", 50 or 100 digits
+    progress : True shows a bar in a terminal or notebook after a second; False shows none; a function is called with each theorem's
         name
     """
     check_wider(precision)
     _check_seed(seed)
     if whole(states, "states") < 0:
-        raise _core.EvaluationError(f"states is {states}: random states beside the present one, 0 or more")
+        raise _core.EvaluationError(f"states={states}: give the number of random states besides the present one, 0 or more")
     source = operators._source
     model = operators._model
     report = Report(source.name, dict(source.traits))
@@ -63,16 +63,16 @@ def check_model(operators: Any, *, states: int = 3, seed: int = 0, precision: st
 
 def _check_seed(seed: Any) -> None:
     if whole(seed, "seed") < 0:
-        raise _core.EvaluationError(f"seed is {seed}: a whole number, 0 or more")
+        raise _core.EvaluationError(f"seed={seed}: give a whole number, 0 or more")
 
 
 def check_wider(precision: str | int) -> None:
-    """A residual must be seen to fall: double beside double shows nothing."""
+    """Check that the precision is wider than double: otherwise a residual cannot be seen to fall."""
     names = list(_core.epsilons())
-    _core.wider(precision)  # raises where there is no such precision
+    _core.wider(precision)  # raises for an unknown precision
     wide = names[names.index("double") + 1 :]
     if precision not in wide:
-        raise _core.EvaluationError(f"precision {precision!r} is not wider than double, in which every residual is taken; name {wide}")
+        raise _core.EvaluationError(f"precision {precision!r} is not wider than double, the first scalar of every residual; choose {wide}")
 
 
 def _present(model: Any) -> Any:
@@ -84,7 +84,7 @@ def _present(model: Any) -> Any:
 def check_theorem(
     theorem: _core.Theorem, unmet: list[str], states: list[BoundState], rng: np.random.Generator, precision: str | int = "extended"
 ) -> Finding:
-    """One theorem at these states; `unmet` are those of its hypotheses that the model does not meet."""
+    """Check one theorem at these states; `unmet` are its hypotheses that the model does not meet."""
     hypotheses = list(theorem.hypotheses)
     finding = Finding(theorem.name, theorem.group, theorem.text, theorem.latex, hypotheses, unmet, "waiting", note=theorem.waiting)
     if theorem.waiting:
@@ -98,7 +98,7 @@ def check_theorem(
     except _core.SingularHingeError as error:
         finding.verdict, finding.note = UNDEFINED, str(error)
     except _core.SingularOperatorError as error:
-        # Outside its hypotheses a theorem may ask for an inverse that is not there: one way to fail.
+        # Outside its hypotheses a theorem may need an inverse that does not exist: one way to fail.
         finding.verdict, finding.note = "expected to fail" if unmet else UNDEFINED, str(error)
     else:
         finding.judged(found)
@@ -109,7 +109,7 @@ def check_theorem(
 
 
 def with_spaces(lhs: Any, rhs: Any) -> tuple[Any, Any]:
-    """An I on one side takes the other side's space."""
+    """Give an I on one side the other side's space."""
     if isinstance(lhs, _core.Operator) and isinstance(rhs, _core.Operator):
         check_has_space(lhs, rhs)
         if rhs.domain is None:
@@ -140,33 +140,33 @@ def check(
     ----------
     statement : str, or a pair (lhs, rhs) of expressions
         As text in Python's spelling, the book's (Unicode or ASCII) or LaTeX: ``"HψMψ*H* == D"``, ``"inv(psi) == inv(phi) + K*H"``. `MM`
-        is the mass matrix HφMφ*H*, `N` the number of coordinates. Operators with bodies behind them make a statement by block,
-        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies of which its relations hold. Letters of one's own
-        stand before it, ``"A := I + HφK; MM + J = A D A*"``, and vectors, ``"x ∈ Θ; ..."``; those of the equations of motion
+        is the mass matrix HφMφ*H*, `N` the number of coordinates. Operators followed by bodies form a statement by block,
+        ``"Ω(i,j) = Υ(i)ψ(i,j), i above j"``: it is checked for every choice of bodies that satisfies its relations. Own letters
+        are defined before it, ``"A := I + HφK; MM + J = A D A*"``, as are vectors, ``"x ∈ Θ; ..."``; vectors of the equations of motion
         (T, θ̈, 𝒞, α, f, z, ε, ν, ...) are known.
     model : Multibody, OperatorSet or None
-        None: random trees that between them meet and break every standard hypothesis, deep and wide ones among them, moving and in
-        gravity (text only; see `pycraft.truth` for where it is true and where not).
-    states : how many states, drawn from `seed`
-    search : when false, look for the standard hypotheses under which it is true, and for the smallest tree, hinge kinds and state that
-        refute it; where no hypothesis saves it, for the smallest that meets all of them
-    precision : the first scalar beside double in which residuals are taken, "extended", "quad", 50 or 100 digits. Where it does not decide,
-        the wider ones are tried in turn: extended costs about twice a run in double, quad 20, 50 digits 60 and 100 digits 100 times.
-        Numbers in the statement that are near each other, or near 0 or 1 (1e-40), ask for one that tells them apart.
-    dialect : the school in whose letters the text is written: "Featherstone", "Khatib", "Mueller", "Park", "Saha" or "Wensing". The text
-        may say so itself: ``"dialect Park; M = S^T G^T J G S"``.
-    budget : CPU seconds for each part of that search: where it is true, and the smallest refutation. The report says where it ended one.
+        None: random trees that together meet and violate every standard hypothesis, including deep and wide ones, moving and in
+        gravity (text only; `pycraft.truth` shows where the statement is true).
+    states : number of states, drawn from `seed`
+    search : for a false statement, search the standard hypotheses under which it is true, and the smallest tree, hinge kinds and state that
+        refute it; if no hypothesis makes it true, the smallest that meets all hypotheses
+    precision : the first scalar after double for residuals, "extended", "quad", 50 or 100 digits. If it does not decide,
+        wider ones are tried in turn: extended costs about twice a run in double, quad 20, 50 digits 60 and 100 digits 100 times.
+        Numbers in the statement that are close to each other, or to 0 or 1 (1e-40), require a scalar that distinguishes them.
+    dialect : notation of the text: "Featherstone", "Khatib", "Mueller", "Park", "Saha" or "Wensing". The text
+        may also name it: ``"dialect Park; M = S^T G^T J G S"``.
+    budget : CPU seconds for each part of the search: hypotheses, and the smallest refutation. The report states which part it ended.
 
     Returns
     -------
     CheckReport
-        True or false as a condition, with `.worst` and `.counterexample`. As a condition it raises UndecidedError where 100 digits do not
-        tell.
+        True or false as a condition, with `.worst` and `.counterexample`. As a condition it raises UndecidedError if 100 digits do not
+        decide.
 
     Notes
     -----
-    Numbers are compared, at states that were drawn: a difference below the report's bound is not seen, unless the statement's own numbers
-    say how small it may be. What holds at every state is shown by `pycraft.prove`.
+    Values are compared at random states: a difference below the report's bound is not detected, unless the statement's own numbers
+    imply how small it may be. `pycraft.prove` proves statements for every state.
 
     Examples
     --------
@@ -180,7 +180,7 @@ def check(
 
     check_wider(precision)
     if whole(states, "states") < 1:
-        raise _core.EvaluationError(f"states is {states}: a statement is checked at one state at least")
+        raise _core.EvaluationError(f"states={states}: a statement needs at least one state")
     _check_seed(seed)
     if isinstance(statement, (tuple, list)) and len(statement) == 2 and all(map(_is_expression, statement)):
         text = f"{statement[0].text()} == {statement[1].text()}"
@@ -190,12 +190,12 @@ def check(
         raise _core.EvaluationError(f"check takes a statement as text or a pair of expressions, not {statement!r:.80}")
     operators: Any = None if model is None else getattr(model, "soa", model)
     if model is not None and not isinstance(operators, OperatorSet):
-        raise _core.EvaluationError(f"a statement is checked on a model or its operators (model.soa), not on {model!r:.80}")
+        raise _core.EvaluationError(f"check takes a model or its operators (model.soa), not {model!r:.80}")
     if isinstance(statement, str) and says_by_block(statement, [] if operators is None else [name for name, *_ in operators.V.blocks]):
         return check_by_block(statement, operators, states=states, seed=seed, precision=precision)
     if model is None:
         if not isinstance(statement, str):
-            raise _core.EvaluationError("expressions belong to one model: give text to check a statement on random trees")
+            raise _core.EvaluationError("expressions belong to one model; give text to check a statement on random trees")
         if said_of_loops(text):
             return _check_on_loops(text, states, seed, precision)
         return _check_on_trees(text, states=states, seed=seed, search=search, precision=precision, budget=budget)
@@ -218,7 +218,7 @@ def check(
 
 
 def _without_inverse(text: str, to_read: str, operators: Any, precision: str | int, error: Exception, vectors: Any) -> CheckReport:
-    """The report of a statement with an inverse that does not exist here, if J > 0 is what it wants; else raises the error."""
+    """Return the report of a statement with an inverse that exists only if J > 0; otherwise raise the error."""
     from .truth import TRUE, UNREAD, truth
 
     try:
@@ -230,12 +230,12 @@ def _without_inverse(text: str, to_read: str, operators: Any, precision: str | i
     report = CheckReport(text, UNDEFINED, 0.0, 0.0, 0, [operators._source.name])
     if all(c.verdict in (TRUE, UNREAD) for c in found):
         report.true_where = [frozenset({"J > 0"})]
-    report.notes.append(f"{error}: it is said of models with rotor inertia at every hinge (hinge.rotor_inertia)")
+    report.notes.append(f"{error}: the statement needs rotor inertia at every hinge (hinge.rotor_inertia)")
     return report
 
 
 def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precision: str | int, budget: float) -> CheckReport:
-    """A statement on the family of random trees, one state each: as many models as states are asked for, and one of each cell."""
+    """Check a statement on the family of random trees, one state each: as many models as states, and at least one of each cell."""
     from .family import family
     from .search import Counterexample, judged, understood
     from .truth import depth_for
@@ -258,7 +258,7 @@ def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precisio
         raise _core.EvaluationError(f"{text!r}: the inverses in it exist on none of the random trees")
     report = CheckReport.of(text, whole, names, understood(text))
     if passed_over and not any(passed_over) and all(with_rotors):
-        report.notes.append("said where J > 0: on models without rotor inertia an inverse in it does not exist")
+        report.notes.append("checked where J > 0: without rotor inertia an inverse in it does not exist")
     if refuted is not None and search:
         _explain(report, text, seed=seed, precision=precision, budget=budget, found=refuted)
     return report
@@ -275,13 +275,13 @@ def _check_on_loops(text: str, states: int, seed: int, precision: str | int) -> 
 
 
 def _explain(report: CheckReport, text: str, **options: Any) -> None:
-    """Under which hypotheses a false statement is true, and its most telling counterexample; nothing if it is of one model only."""
+    """Add the hypotheses under which a false statement is true, and its best counterexample; nothing if it applies only to one model."""
     from .truth import explained, saving
 
     try:
         found, report.counterexample = explained(text, **options)
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
-        report.notes.append("it cannot be read on random trees: no smaller counterexample was looked for")
+        report.notes.append("it cannot be read on random trees, so no smaller counterexample was searched for")
     else:
         spent = f"after {options['budget']:g} s of CPU time (budget={options['budget']:g})"
         if found is None:
@@ -297,7 +297,7 @@ def _explain(report: CheckReport, text: str, **options: Any) -> None:
 
 
 def run(read: Statement, operators: Any, states: int, seed: int, precision: str | int) -> Verdict:
-    """The verdict on a statement at random states of one model."""
+    """Return the verdict on a statement at random states of one model."""
     model = operators._model
     rng = np.random.default_rng(seed)
     drawn = [BoundState(operators, s) for s in ([None] if model is None else [operators.random_state(rng) for _ in range(states)])]

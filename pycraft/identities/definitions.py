@@ -1,8 +1,8 @@
-"""Letters of one's own around a statement: `x ∈ Θ; A := I + HφK; statement`, or behind it: `statement, where ν = D⁻¹ε`.
+"""Own letters defined before a statement, `x ∈ Θ; A := I + HφK; statement`, or after it, `statement, where ν = D⁻¹ε`.
 
-A definition is `name := expression`, `name ∈ Θ` for a vector of which nothing else is known, or `name : Θ → V` for such an operator; W is
-the space between M^½ and M^½*. Names are letters of any alphabet, with subscripts and accents. They hold for the statement and for the
-definitions that follow; of those behind it each holds for the ones before it, as one says them: ν = D⁻¹(T - Hz), z = ψ(KT + Pa + b).
+A definition is `name := expression`, `name ∈ Θ` for an unknown vector, or `name : Θ → V` for an unknown operator; W is
+the space between M^½ and M^½*. Names are letters of any alphabet, with subscripts and accents. They apply to the statement and to later
+definitions; definitions after the statement apply to earlier ones, as in speech: ν = D⁻¹(T - Hz), z = ψ(KT + Pa + b).
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ _BEHIND = re.compile(r"(?:\b(?:where|with|and)\b|(?<!\\)[,;]|\\q?quad(?![A-Za-z]
 
 @dataclass(frozen=True)
 class Definition:
-    """A letter: its name in the grammar's spelling, what it stands for, and both as they were typed.
+    """A letter: its name in the grammar's spelling, its meaning, and both as typed.
 
-    `others` are further meanings, where the spaces choose one; `of_the_book` says that it is defined by letters of the book alone.
+    `others` are further meanings, among which the spaces choose; `of_the_book` means that only letters of the book define it.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Definition:
 
 
 def letter_name(typed: str) -> str:
-    """A name in the grammar's spelling, "Gamma" for Γ; raises ParseError for what is none."""
+    """Return a name in the grammar's spelling, "Gamma" for Γ. Raises ParseError for an invalid name."""
     name = re.sub(r"\s*_\s*", "_", spelled(typed.strip()).text.strip())
     if not name.isidentifier():
         raise ParseError(f"{typed.strip()!r} is no name for a letter: a letter of any alphabet, with letters, digits and _ behind it")
@@ -49,7 +49,7 @@ def letter_name(typed: str) -> str:
 
 
 def is_letter(typed: str) -> bool:
-    """Whether a text is one letter, with subscripts and accents, and nothing else: HG is two."""
+    """Return True if a text is a single letter, with subscripts and accents: HG is two."""
     try:
         base = letter_name(typed).partition("_")[0]
     except ParseError:
@@ -58,7 +58,7 @@ def is_letter(typed: str) -> bool:
 
 
 def pieces(text: str, separators: str) -> list[str]:
-    """The parts of a text between separators that stand outside of brackets; \\, and \\; are spaces of LaTeX."""
+    """Return the parts of a text between separators outside brackets; \\, and \\; are spaces of LaTeX."""
     found, begin, depth = [], 0, 0
     for i, c in enumerate(text):
         if i and text[i - 1] == "\\" and c in ",;:{}":
@@ -71,7 +71,7 @@ def pieces(text: str, separators: str) -> list[str]:
 
 
 def definition(text: str, signs: Iterable[str] = _SIGNS) -> Definition | None:
-    """What a text defines; None where it is no definition."""
+    """Return the definition in a text; None if it is not a definition."""
     for sign in signs:
         name, found, what = text.partition(sign)
         if found and what.strip() and (sign == ":=" or is_letter(name) and not what.startswith("=")):
@@ -80,14 +80,14 @@ def definition(text: str, signs: Iterable[str] = _SIGNS) -> Definition | None:
 
 
 def parted(text: str, is_by_block: Callable[[str, Iterable[str]], bool] | None = None) -> tuple[list[Definition], str]:
-    """(the definitions in front of and behind a statement, the statement).
+    """Return the definitions before and after a statement, and the statement.
 
-    Behind a statement by block, of which `is_by_block` tells, stand relations of bodies, and definitions with := alone.
+    A statement by block, recognized by `is_by_block`, is followed by relations of bodies, and only by definitions with :=.
 
     Raises
     ------
     ParseError
-        A part in front of the statement is no definition.
+        A part before the statement is not a definition.
     """
     *before, claim = pieces(text, ";")
     found: list[Definition] = []
@@ -114,7 +114,7 @@ def parted(text: str, is_by_block: Callable[[str, Iterable[str]], bool] | None =
 
 
 def _behind(part: str, signs: Iterable[str]) -> Definition | None:
-    """What a part behind a statement defines: one letter on its left side; None where it is no definition."""
+    """Return the definition in a part after a statement, with one letter on its left side; None if it is not a definition."""
     begin = _BEHIND.match(part)
     part = part[begin.end() if begin else 0 :]
     for sign in signs:
@@ -126,7 +126,7 @@ def _behind(part: str, signs: Iterable[str]) -> Definition | None:
 
 
 def shown_text(what: str) -> str:
-    """The text of a definition as it is shown: the table's letters for the grammar's names."""
+    """Return the displayed text of a definition, with the table's letters for the grammar's names."""
     text = re.sub(r"\s+", " ", re.sub(r"[A-Za-z_]+", lambda m: _SHOWN.get(m[0], m[0]), spelled(what).text)).strip()
     return re.sub(r" ?\^\*(?: (?=[)\]]))?", "*", text)
 
@@ -135,7 +135,7 @@ _SHOWN = {s.name: s.text for s in _core.symbols} | {n: known.text for n, known i
 
 
 def drawn(seed: int = 0) -> Callable[[str, Any], Any]:
-    """Vectors of random numbers as operators that have them, by name and space: for what takes no vectors whose numbers are given later."""
+    """Return random vectors as operators, by name and space, for functions that do not accept named vectors."""
 
     def vector(name: str, space: Any) -> Any:
         rng = np.random.default_rng([seed, *name.encode()])
@@ -145,17 +145,17 @@ def drawn(seed: int = 0) -> Callable[[str, Any], Any]:
 
 
 def is_map(made: Definition) -> bool:
-    """Whether a letter is an operator of which nothing is known but its spaces."""
+    """Return True if a letter is an operator known only by its spaces."""
     return _MAP.match(made.what) is not None
 
 
 def meant(made: Definition, operators: Any, read: Callable[[str], Any], vector: Callable[[str, Any], Any] = _core.vector) -> Any:
-    """What a letter stands for on a model; `read` makes an expression of text.
+    """Return the meaning of a letter on a model; `read` parses text.
 
     Raises
     ------
     ParseError
-        A space that the model has not; text that is no expression.
+        A space that the model lacks; text that is not an expression.
     """
     if (found := _VECTOR.match(made.what)) is not None:
         return vector(made.name, _space(found[1], operators))

@@ -11,14 +11,14 @@ from typing import Any
 from .. import _core
 
 COORDINATES = ("i", "j")
-"""What coordinates are called in text; which ones of a model they are, `coordinates_meant` says."""
+"""Names of coordinates in text; `coordinates_meant` chooses coordinates of a model for them."""
 
 
 def coordinates_meant(operators: Any) -> tuple[int, int]:
-    """The coordinates i and j of a model: where a statement about any coordinate is most likely to fail.
+    """Return the coordinates i and j of a model for which a statement about any coordinate is most likely to fail.
 
-    i is the last of its hinge, so that the subhinges before it turn with it, of a body that hangs on another and carries some; j is one
-    outboard of it where there is one, else another.
+    i is the last coordinate of its hinge, so that the subhinges before it turn with it, of a body with a parent and children; j is a
+    coordinate outboard of it if there is one, else another.
 
     Raises
     ------
@@ -77,10 +77,10 @@ def along(x: Any, direction: str, operators: Any) -> Any:
     Raises
     ------
     EvaluationError
-        What is to be differentiated is no expression.
+        The argument is not an expression.
     """
     if not isinstance(x, (_core.Operator, _core.Scalar)):
-        raise _core.EvaluationError(f"{x} is a number: nothing to differentiate")
+        raise _core.EvaluationError(f"{x} is a number, which cannot be differentiated")
     if direction == "mass":
         last = len(operators._source.parents) - 1
         return x.diff(_core._inertia_parameter(operators._source, last, MASS, "mass"))

@@ -1,8 +1,8 @@
-"""Random models that between them meet and break every standard hypothesis: where statements without a model of their own are tried.
+"""Random models that together meet and violate every standard hypothesis, for statements without their own model.
 
-The models are sorted into cells: serial chains and trees, without and with rotor inertia, hinges of one coordinate, of several on a
-constant H, of every kind, on a fixed and on a free base. In each cell there are small, bushy and deep ones: blocks of E_φ^k vanish on trees
-of depth k, so some are deep. Every model moves and feels gravity; each body k has a node "node<k>" beside its own frame.
+The models form cells: serial chains and trees, without and with rotor inertia, hinges of one coordinate, of several with a
+constant H, of every kind, on a fixed and on a free base. Each cell has small, bushy and deep models: blocks of E_φ^k vanish on trees
+of depth k, so some must be deep. Every model moves and has gravity; each body k has a node "node<k>" beside its own frame.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from .part_letters import VECTORS
 
 _SIZES = {kind: row.nv for kind, row in _core.hinge_kinds.items()} | {"custom": 3}
 DOF = dict(sorted(_SIZES.items(), key=lambda item: item[1]))
-"""Degrees of freedom of the hinge kinds, fewest first; of the custom hinges of `pycraft.tree`."""
+"""Degrees of freedom of the hinge kinds, fewest first; for custom hinges, as in `pycraft.tree`."""
 ONE_SUBHINGE = tuple(kind for kind, row in _core.hinge_kinds.items() if len(row.subhinges) < 2 and kind != "custom")
-"""Kinds whose H is constant."""
+"""Kinds with a constant H."""
 HYPOTHESES = ("J = 0", "serial chain", "constant H", "single-DOF hinges", "free root")
-"""The standard hypotheses, as the theorems name them."""
+"""The standard hypotheses, by their names in theorems."""
 DEPTH = 12
-"""Bodies on the longest path of the deep models."""
+"""Number of bodies on the longest path of the deep models."""
 
 
 @dataclass(frozen=True)
 class Spec:
-    """A model by rule: what `pycraft.tree` is given, gravity and one state."""
+    """Specification of a model: the arguments of `pycraft.tree`, gravity and one state."""
 
     parents: tuple[int, ...]
     kinds: tuple[str, ...]
@@ -44,12 +44,12 @@ class Spec:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Bodies, degrees of freedom."""
+        """Numbers of bodies and degrees of freedom."""
         return len(self.parents), sum(DOF[kind] for kind in self.kinds)
 
     @property
     def met(self) -> frozenset[str]:
-        """The hypotheses that it meets."""
+        """Hypotheses that the model meets."""
         n, roots = len(self.parents), [k for k, p in enumerate(self.parents) if p < 0]
         said = {
             "J = 0": not self.rotor_inertia,
@@ -61,7 +61,7 @@ class Spec:
         return frozenset(name for name, is_met in said.items() if is_met)
 
     def model(self) -> Any:
-        """The model, with gravity and a node on every body."""
+        """Return the model, with gravity and a node on every body."""
         model = tree(self.parents, self.kinds, seed=self.seed, rotor_inertia=self.rotor_inertia, welds="keep")
         rng = np.random.default_rng([self.seed, 1])
         model.gravity = rng.uniform(1, 10, 3) * rng.choice([-1, 1], 3)
@@ -71,7 +71,7 @@ class Spec:
         return model
 
     def states(self, model: Any, count: int) -> list[State]:
-        """Seeded states of the model, velocities included."""
+        """Return seeded states of the model, with velocities."""
         rng = np.random.default_rng(self.seed)
         return [model.random_state(rng) for _ in range(count)]
 
@@ -82,7 +82,7 @@ class Spec:
 
 @dataclass(frozen=True)
 class Cell:
-    """A class of models: tree or chain, with or without J, which hinges, on which base."""
+    """A class of models: tree or chain, with or without J, kind of hinges, kind of base."""
 
     shape: str
     J: str
@@ -93,7 +93,7 @@ class Cell:
         return f"{self.shape}, {self.J}, {self.hinges}, {self.base}"
 
     def holds(self, spec: Spec) -> bool:
-        """Whether a model belongs to the cell, or is one of the simpler models that it includes."""
+        """Return True if a model belongs to the cell, or is one of the simpler models that it includes."""
         met = spec.met
         others = [kind for k, kind in enumerate(spec.kinds) if spec.parents[k] >= 0 or self.base == FIXED]
         return (
@@ -105,7 +105,7 @@ class Cell:
 
     @property
     def least(self) -> frozenset[str]:
-        """The hypotheses that every model of the cell meets."""
+        """Hypotheses that every model of the cell meets."""
         free = self.base == FREE
         said = {
             "J = 0": self.J != WITH_J,
@@ -136,7 +136,7 @@ VARIANTS = len(_TREES)
 
 @cache
 def specs(cell: Cell, depth: int = DEPTH) -> tuple[Spec, ...]:
-    """The models of a cell: small, middle, deep, and wide or of every kind."""
+    """Yield the models of a cell: small, middle, deep, and wide or of every kind."""
     number = CELLS.index(cell)
     found = []
     for i, parents in enumerate(_TREES if cell.shape == TREE else _CHAINS):
@@ -154,7 +154,7 @@ def specs(cell: Cell, depth: int = DEPTH) -> tuple[Spec, ...]:
 
 
 def family(count: int, depth: int = DEPTH) -> list[Spec]:
-    """At least `count` models (and one of each cell): small, middle, deep and wide ones in turn, so that every cell has each in the end."""
+    """Return at least `count` models, and one of each cell: small, middle, deep and wide ones in turn, so every cell gets all sizes."""
     rounds = -(-max(count, 1) // len(CELLS))
     return [
         specs(cell, depth)[(number + number // VARIANTS + turn) % VARIANTS]
@@ -164,7 +164,7 @@ def family(count: int, depth: int = DEPTH) -> list[Spec]:
 
 
 def respelled(text: str, spec: Spec) -> str:
-    """The text as it is said of this model: the one coordinate of a hinge bears its name, of several each a number as well."""
+    """Return the text for this model: a single coordinate has its hinge's name, several also have numbers."""
 
     def coordinate(found: re.Match[str]) -> str:
         k, index = int(found[1]), found[2]
@@ -177,7 +177,7 @@ def respelled(text: str, spec: Spec) -> str:
 
 
 def named_vectors(read: Statement) -> dict[str, str]:
-    """The names of a statement's vectors and of the spaces that they lie in: its text says of neither."""
+    """Return the names of a statement's vectors and of their spaces, which its text does not contain."""
     found: dict[str, str] = {}
     todo = [read.lhs, read.rhs]
     while todo:
@@ -192,7 +192,7 @@ def named_vectors(read: Statement) -> dict[str, str]:
 
 
 def read_on(text: str, spec: Spec, model: Any, vectors: Mapping[str, str] | None = None) -> Statement | None:
-    """The statement on this model; None where it names what the model has not. `vectors` names the spaces of the vectors in the text."""
+    """Return the statement on this model; None if it names something that the model lacks. `vectors`: spaces of vectors in the text."""
     spaces = {space.name: space for space in (model.soa.Theta, model.soa.V, model.soa.F)}
     if not spaces.keys() >= set((vectors or {}).values()):
         return None
@@ -204,7 +204,7 @@ def read_on(text: str, spec: Spec, model: Any, vectors: Mapping[str, str] | None
 
 
 def nilpotency(side: Any) -> int:
-    """The largest number of factors in a product: as deep a tree must be for none of them to vanish by its depth."""
+    """Return the largest number of factors in a product: the depth that a tree needs so that no product vanishes by depth."""
     if isinstance(side, _core.Scalar):
         return max((nilpotency(e) for e in side.operands()), default=0)
     if not isinstance(side, _core.Operator):

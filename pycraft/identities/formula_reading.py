@@ -1,4 +1,4 @@
-"""Text to formulas: the syntax tree of a statement, in Python's reading or the book's, whether its spaces fit or not."""
+"""Text to formulas: the syntax tree of a statement, in Python's reading or the book's, even if its spaces do not match."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from .vocabulary import ParseError, decimal
 
 _PLAIN = (set(SYMBOLS) - set(INDEXED)) | {"X", "V", "vdot", *STANDARD, *HYBRID, *OF_TREES, *OF_ROTORS}
 LETTERS = frozenset(_PLAIN | {f"{name}_dot" for name in _PLAIN - {"I", "N"} if not name.endswith("dot")})
-"""Letters that formulas have without definitions."""
+"""Letters that need no definition in formulas."""
 
 
 def read_formula(text: str, own: Iterable[str] = ()) -> Formula:
-    """Both sides of a statement, `own` the names of letters that were defined for it.
+    """Return both sides of a statement; `own` are the names of letters defined for it.
 
-    Python's reading where the text has `@`, `.T` or a call of `inv`, else the book's.
+    Python's reading is used if the text has `@`, `.T` or a call of `inv`, else the book's.
 
-    Raises ParseError where it is no statement.
+    Raises ParseError if it is not a statement.
     """
     source = as_logarithms(spelled(text).text)
     is_python = re.search(r"@|\.T\b|\.inv\(|\binv\(", source) and "^" not in source
@@ -72,7 +72,7 @@ def _from_ast(node: ast.AST, names: frozenset[str]) -> Node:
             return _call(name, _from_ast(inner, names))
         case ast.Call(func=ast.Name(id=name), args=arguments) if name in INDEXED:
             return Letter(name, tuple(ast.unparse(a) for a in arguments))
-    raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
+    raise ParseError(f"{ast.unparse(node)!r} is not an operator expression")
 
 
 def _call(function: str, inner: Node) -> Node:
@@ -108,12 +108,12 @@ class Book:
             at = found[2]
 
     def _token(self, source: str, at: int) -> tuple[str, str, int] | None:
-        """(kind, text, where it ends) of what stands at a place."""
+        """Return (kind, text, end) of the token at a place."""
         found = _tokens(self._names).match(source, at)
         return None if found is None else (str(found.lastgroup), found[str(found.lastgroup)], found.end())
 
     def _stumbled(self, message: str, at: int) -> ParseError:
-        """The error of what stands at a place."""
+        """Return the error for the token at a place."""
         return ParseError(message)
 
     def _take(self) -> tuple[str, str]:
@@ -188,7 +188,7 @@ class Book:
             name, _, arguments = text.partition("(")
             return Letter(name.strip(), tuple(a.strip().strip("'\"") for a in arguments[:-1].split(",")))
         if kind == "function":
-            if self._next()[1] not in ("(", "[", "{"):  # tr ΥM, ln det D: what follows; √D: the one factor
+            if self._next()[1] not in ("(", "[", "{"):  # tr ΥM, ln det D: the rest of the product; √D: one factor
                 return _call("sqrt", self._postfix()) if text == "√" else _call(text, self._product())
             self._take()
             node = self._sum()

@@ -49,7 +49,7 @@ class OnLoops(OperatorSet):
 
 
 def said_of_loops(text: str) -> bool:
-    """Whether letters of loops stand in a statement, other than such as it defines."""
+    """Return True if a statement contains letters of loops that it does not define."""
     definitions, claim = divided(text)
     own = {d.name for d in definitions}
     whole = " ; ".join(spelled(part).text for part in (claim, *(d.what for d in definitions)))
@@ -57,7 +57,7 @@ def said_of_loops(text: str) -> bool:
 
 
 def on_loops(operators: Any, text: str) -> Any:
-    """These operators, or for a statement about loops those of the whole model at states on its loops.
+    """Return these operators, or for a statement about loops the operators of the whole model at states on its loops.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 """Statements as text: Python's spelling, the book's (Unicode or ASCII, juxtaposition and a postfix star), or LaTeX.
 
 Both readings are tried, Python's (``*`` and ``@`` multiply, ``.T`` transposes) and the book's (juxtaposition multiplies, a postfix ``*``
-transposes); the one whose names and spaces fit is taken. Where both fit and differ, the error shows both. In both ``**`` is Python's power.
-In the book's reading the numbers in front of a product scale the whole of it: 2 D D is 2 (D D), as it is shown. Numbers are what is
-typed: 0.3 is 3/10 and D/3 a third, exactly.
+transposes); the one with matching names and spaces is used. If both match and differ, the error shows both. In both, ``**`` is a power.
+In the book's reading, numbers in front of a product scale the whole product: 2 D D is 2 (D D), as displayed. Numbers are taken as
+typed: 0.3 is exactly 3/10, and D/3 exactly a third.
 """
 
 from __future__ import annotations
@@ -47,20 +47,20 @@ class Statement:
 
     @property
     def understood(self) -> str:
-        """The statement as it was read, in the package's own letters, and what other letters in it stand for."""
+        """The statement as read, in the package's own letters, and the meanings of other letters."""
         at = self
         if self._shown is not None:
             try:
                 at = self._shown()
             except (_core.Error, ArithmeticError, TypeError, ValueError, AttributeError):
-                pass  # a letter that stands for itself has no inverse, root or rate that could be shown
+                pass  # a letter without a definition has no inverse, root or rate to show
         text = _text(at.lhs) + ("" if at.rhs is None else f" {self.relation} {_text(at.rhs)}")
         where = "; ".join(f"{name} = {what}" for name, what in self.letters.items()) if at is not self else ""
         return (f"{text}, where {where}" if where else text).replace("vdot", "θ̈")
 
 
 class Statements:
-    """Reads statements on the letters of one model; `vector(name, space)` makes the vectors of which a statement says no more."""
+    """Reads statements in the letters of one model; `vector(name, space)` creates unknown vectors."""
 
     def __init__(
         self, operators: Any, extra: Mapping[str, Any] | None = None, *, vector: Callable[[str, Any], Any] = _core.vector, **options: Any
@@ -69,14 +69,14 @@ class Statements:
         self._vocabulary = Vocabulary(operators, extra, read=self._meaning, **options)
 
     def read(self, text: str, before: Sequence[Definition] = (), *, inequalities: bool = False) -> Statement:
-        """The statement, by the one reading whose names and spaces fit, with the definitions around it and those before.
+        """Return the statement by the reading with matching names and spaces, with the definitions around it and earlier ones.
 
         `inequalities` says whether it may be one; what handles equations alone refuses them by name.
 
         Raises
         ------
         ParseError
-            Nothing fits (the reasons of both readings are shown), or both do. SpacesError where only the spaces do not fit.
+            Neither reading matches (both reasons are shown), or both do. SpacesError if only the spaces do not match.
         """
         definitions, claim = divided(text, self._is_by_block)
         definitions = [*before, *definitions]
@@ -111,7 +111,7 @@ class Statements:
         return self._vocabulary.with_letters(definitions, choice or {})
 
     def _meaning(self, what: str, vocabulary: Vocabulary, name: str) -> Any:
-        """What a definition says, in the words that it sees."""
+        """Return the meaning of a definition, in the vocabulary available to it."""
 
         def expression(text: str) -> Any:
             found = self._fitting(self._spelled(text), text, text, vocabulary)
@@ -122,14 +122,14 @@ class Statements:
         return meant(Definition(name, what, f"{name} := {what}"), self._operators, expression, self._vector)
 
     def _fitting(self, source: Spelled, text: str, claim: str, vocabulary: Vocabulary) -> Statement:
-        """The one of both readings that fits."""
+        """Return the reading that matches."""
         found: list[Statement] = []
         reasons: dict[str, str] = {}
         place, misfits = "", False
         for reading in ("Python", "the book"):
             try:
                 found.append(self._read(source, text, reading, vocabulary))
-            # The core's errors of names, spaces and models are TypeErrors and ValueErrors; what Python finds wrong reads no better.
+            # The core's errors of names, spaces and models are TypeErrors and ValueErrors.
             except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
                 reasons[reading] = "it divides by zero" if isinstance(error, ZeroDivisionError) else str(error)
                 misfits = misfits or isinstance(error, _core.SpaceError) and not isinstance(error, _NoSpaceError)
@@ -143,7 +143,7 @@ class Statements:
         first = found[0]
         if len(found) == 2 and not (_same(first.lhs, found[1].lhs) and _same(first.rhs, found[1].rhs)):
             shown = "\n".join(f"  {s.reading}: {_text(s.lhs)} {s.relation} {_text(s.rhs)}" for s in found)
-            raise ParseError(f"{claim!r} reads in two ways and both fit:\n{shown}\nwrite .T for a transpose, or juxtapose to multiply")
+            raise ParseError(f"{claim!r} is ambiguous; both readings match:\n{shown}\nwrite .T for a transpose, or juxtapose to multiply")
         if vocabulary.used:
             used = reversed(vocabulary.used.items())
             first.letters = {shown_text(n): shown_text(what) for n, (what, _) in used if shown_text(what) != shown_text(n)}
@@ -204,7 +204,7 @@ class Statements:
                 return FUNCTIONS[name](self._evaluate(inner, source, vocabulary))
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in WITH_ARGUMENTS:
                 return vocabulary.indexed(name, [ast.unparse(a) for a in arguments])
-        raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
+        raise ParseError(f"{ast.unparse(node)!r} is not an operator expression")
 
 
 def _side(read_sides: Callable[..., list[Any]], part: str, begin: int, vocabulary: Vocabulary) -> Any:
@@ -217,12 +217,12 @@ def _side(read_sides: Callable[..., list[Any]], part: str, begin: int, vocabular
 
 
 def _comparison(source: str) -> str:
-    """A single = as Python's ==."""
+    """Replace a single = by Python's ==."""
     return re.sub(r"(?<![=<>!])=(?!=)", "==", source)
 
 
 def _looks_like_python(source: str) -> bool:
-    """Whether the spelled text parses as Python, whatever its names: then Python's objection is worth reading beside the book's."""
+    """Return True if the text parses as Python, with any names: then Python's error is worth showing beside the book's."""
     try:
         ast.parse(_comparison(source.strip()), mode="eval")
     except (SyntaxError, ValueError):
@@ -249,14 +249,14 @@ def _combine(f: Any, a: Any, b: Any) -> Any:
 
 
 def _same(a: Any, b: Any) -> bool:
-    """Whether two readings are one: also where a number scales one factor in Python, (2 D) D, and the product in the book, 2 (D D)."""
+    """Return True if two readings agree, also if a number scales one factor in Python, (2 D) D, and the product in the book, 2 (D D)."""
     if isinstance(a, _core.Operator) and isinstance(b, _core.Operator):
         return a == b or _unscaled(a) == _unscaled(b) and _core.equal_by_theorems(a, b)
     return type(a) is type(b) and a == b
 
 
 def _unscaled(side: _core.Operator) -> Any:
-    """What an expression is made of, whatever the numbers in it."""
+    """Return the structure of an expression, without its numbers."""
     if not side.children:
         return side
     if side.kind == "scaled":
@@ -273,7 +273,7 @@ def _text(side: Any) -> str:
 
 
 def _balance(side: Any, other: Any) -> Any:
-    """0 and I take the spaces of the other side; numbers beside a scalar become scalars."""
+    """Give 0 and I the spaces of the other side; numbers beside a scalar become scalars."""
     if is_operator(other) and other.domain is not None:
         if is_number(side) and side == 0:
             return _core.zero(other.domain, other.codomain)
@@ -290,27 +290,27 @@ def _check_same_spaces(lhs: Any, rhs: Any) -> None:
         raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)}: one is an operator, the other a number")
     if isinstance(lhs, _core.Operator) and isinstance(rhs, _core.Operator):
         check_has_space(lhs, rhs)
-        lhs - rhs  # raises where the spaces differ
+        lhs - rhs  # raises if the spaces differ
     elif is_operator(lhs):  # a formula with derivatives
         for a, b in ((lhs.domain, rhs.domain), (lhs.codomain, rhs.codomain)):
             if a is not None and b is not None and a != b:
                 raise _core.SpaceError(f"{_text(lhs)} and {_text(rhs)} do not act between the same spaces")
     elif not isinstance(lhs, _core.Scalar) and not isinstance(rhs, _core.Scalar):
-        raise ParseError("a statement about numbers alone")
+        raise ParseError("a statement needs an operator, not only numbers")
 
 
 def as_text(statement: Any) -> str:
-    """A statement that is given as text. EvaluationError where it is none."""
+    """Return a statement given as text. Raises EvaluationError for other objects."""
     if not isinstance(statement, str):
         raise _core.EvaluationError(f"a statement is text, such as 'ψ⁻¹ = φ⁻¹ + KH', not {statement!r:.80}")
     return statement
 
 
 class _NoSpaceError(_core.SpaceError):
-    """Neither side says on which space its I acts."""
+    """Neither side determines the space of its I."""
 
 
 def check_has_space(lhs: _core.Operator, rhs: _core.Operator) -> None:
-    """Raises where neither side says on which space its I acts."""
+    """Raise an error if neither side determines the space of its I."""
     if lhs.domain is None and rhs.domain is None:
-        raise _NoSpaceError(f"{lhs.text()} = {rhs.text()} is said of no space: an I takes its space from an operator beside it")
+        raise _NoSpaceError(f"{lhs.text()} = {rhs.text()} has no space: an I needs an operator beside it to determine its space")

@@ -1,4 +1,4 @@
-"""Letters of parts of a model and of trees made of it, told by their subscripts.
+"""Letters of parts of a model and of trees derived from it, identified by their subscripts.
 
     f, p    the coordinates that are free, and those that are prescribed: every third hinge, or those of `soa.free(...)`
     w       all bodies in world axes about the world's origin
@@ -61,12 +61,12 @@ VECTORS = frozenset(_VECTORS)
 
 
 def text_of_part(name: str) -> str | None:
-    """What a part is made of, in the grammar's spelling; None where it is a letter of its own."""
+    """Return the definition of a part, in the grammar's spelling; None if it is a letter of its own."""
     return _MADE.get(name)
 
 
 def part(operators: Any, name: str) -> Any:
-    """The operator of a part.
+    """Return the operator of a part.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def _letter(operators: Any, name: str) -> Any:
 
 
 def _kept(operators: Any, key: str, make: Callable[[], Any]) -> Any:
-    """What was made once for these operators."""
+    """Return the cached objects of these operators."""
     made: Any = operators._made
     if key not in made:
         made[key] = make()
@@ -143,7 +143,7 @@ _TREES: dict[str, Callable[[Any], Any]] = {
 
 # ---------------------------------------------------------------------- loops
 def speaks_of_loops(names: set[str]) -> bool:
-    """Whether letters of embedded loops, or of rows of loops, are among these names."""
+    """Return True if letters of embedded loops, or of rows of loops, are among these names."""
     return bool({name.removesuffix("_dot") for name in names} & (ON_LOOPS | OF_ROWS))
 
 

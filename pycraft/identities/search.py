@@ -1,10 +1,10 @@
 """The smallest refutation of a false statement.
 
-A refutation that was found is made smaller as long as it refutes: bodies are left out, hinges made simpler, rotor inertias taken away. Then
-everything that is smaller still is tried in order of (bodies, degrees of freedom): every tree shape with every choice of hinge kinds,
-without and then with rotor inertia, `STATES` seeded states each, so that the first refutation is the smallest among all that were tried.
-Welds count as kinds: they are kept, as bodies without a coordinate. Models of welds alone are left out, as they have no state. Models that
-have not what the statement names say nothing, and are passed over.
+A refutation is reduced as long as it refutes: bodies are removed, hinges simplified, rotor inertias removed. Then
+all smaller models are tried in order of (bodies, degrees of freedom): every tree shape with every choice of hinge kinds,
+without and then with rotor inertia, `STATES` seeded states each, so that the first refutation is the smallest of all tried.
+Welds count as kinds: they are kept, as bodies without a coordinate. Models with only welds are skipped, because they have no state. Models
+that lack something the statement names are skipped.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ _BY_GRAVITY = {"a", "gravity_field", "gravity_base"}
 
 @dataclass
 class Counterexample:
-    """The smallest model and state found at which a statement is false, and what was tried before."""
+    """The smallest model and state found at which a statement is false, and the extent of the search."""
 
     spec: Spec
     state: State
     residual: float
     tried: int = 0
-    """Smaller models that were tried."""
+    """Number of smaller models tried."""
     states: int = STATES
     exhausted: bool = False
-    """Whether all smaller ones were tried."""
+    """True if all smaller models were tried."""
     meets: frozenset[str] = frozenset()
-    """Hypotheses that all models tried had to meet."""
+    """Hypotheses required of all tried models."""
     saved_by: list[str] = field(default_factory=list)
     letters: frozenset[str] = frozenset()
 
@@ -77,7 +77,7 @@ class Counterexample:
         return self.state.v
 
     def model(self) -> Any:
-        """The model, at the refuting state, with the gravity it was tried in."""
+        """Return the model at the refuting state, with its gravity."""
         model = self.spec.model()
         model.q, model.v = self.state.q, self.state.v
         return model
@@ -101,13 +101,13 @@ class Counterexample:
         elif self.exhausted:
             lines += [f"  every smaller tree shape and choice of hinge kinds{that} was tried:", f"  {counted}"]
         else:
-            lines.append("  no body of it can be left out and no hinge made simpler;")
-            lines += [f"  of what is smaller{that} not all was tried:", f"  {counted}"]
+            lines.append("  no body can be removed and no hinge simplified;")
+            lines += [f"  not all smaller models{that} were tried:", f"  {counted}"]
         return "\n".join(wrapped(f"  {line}") for line in lines)
 
 
 def understood(text: str) -> str:
-    """How a text reads on a small tree, in the package's own letters; empty where it reads on a model of its own alone."""
+    """Return a text as read on a small tree, in the package's own letters; empty if it can be read only on its own model."""
     spec = Spec((-1, 0), ("pin", "pin"), True, 1)
     try:
         read = read_on(text, spec, spec.model())
@@ -120,7 +120,7 @@ def understood(text: str) -> str:
 def judged(
     text: str, spec: Spec, states: int = 1, precision: str | int = "extended", vectors: Mapping[str, str] | None = None
 ) -> Verdict | None:
-    """The verdict on a model: up to the first state that refutes. None where it has not what the statement names, or no inverse exists."""
+    """Return the verdict on a model, up to the first refuting state. None if it lacks something the statement names, or an inverse."""
     model = spec.model()
     read = read_on(text, spec, model, vectors)
     if read is None or read.rhs is None:
@@ -142,7 +142,7 @@ def judged(
 def refutation(
     text: str, spec: Spec, precision: str | int = "extended", states: int = STATES, vectors: Mapping[str, str] | None = None
 ) -> Counterexample | None:
-    """The first state of a model that refutes, or None."""
+    """Return the first refuting state of a model, or None."""
     found = judged(text, spec, states, precision, vectors)
     if found is None or found.verdict != FAILS:
         return None
@@ -151,14 +151,14 @@ def refutation(
 
 # ---------------------------------------------------------------------- smaller
 def _without(spec: Spec, k: int) -> Spec:
-    """The model without body k, its children moved to its parent."""
+    """Return the model without body k, with its children moved to its parent."""
     parents = [spec.parents[k] if p == k else p for i, p in enumerate(spec.parents) if i != k]
     kinds = tuple(kind for i, kind in enumerate(spec.kinds) if i != k)
     return replace(spec, parents=tuple(p - (p > k) for p in parents), kinds=kinds)
 
 
 def _smaller(spec: Spec) -> Iterator[Spec]:
-    """One step smaller: halves first, then a body less, then a simpler hinge, then no rotor inertia."""
+    """Yield models one step smaller: halves first, then without a body, then with a simpler hinge, then without rotor inertia."""
     n = len(spec.parents)
     if n > 3:
         half = spec
@@ -182,7 +182,7 @@ def shrunk(
     states: int = STATES,
     vectors: Mapping[str, str] | None = None,
 ) -> Counterexample:
-    """A refutation of which nothing can be taken away, among the models that are allowed."""
+    """Return a refutation that cannot be reduced, among the allowed models."""
     smaller = True
     while smaller and not budget.over:
         smaller = False
@@ -199,7 +199,7 @@ def shrunk(
 
 
 def shapes(n: int) -> Iterator[list[int]]:
-    """All rooted forests of n bodies with depth-first parents, up to relabelling of siblings."""
+    """Yield all rooted forests of n bodies with depth-first parents, up to relabelling of siblings."""
     seen = set()
     for parents in itertools.product(*[range(-1, k) for k in range(n)]):
         form = _canonical(list(parents))
@@ -220,7 +220,7 @@ def _canonical(parents: list[int]) -> Any:
 
 
 def candidates(largest: int) -> Iterator[Spec]:
-    """Models by bodies, then degrees of freedom, then without before with rotor inertia."""
+    """Yield models by bodies, then degrees of freedom, then first without and then with rotor inertia."""
     for n in range(1, largest + 1):
         moving = (kinds for kinds in itertools.product(KINDS, repeat=n) if any(DOF[k] for k in kinds))
         choices = sorted(moving, key=lambda kinds: sum(DOF[k] for k in kinds))
@@ -244,15 +244,15 @@ def smallest(
     allowed: Callable[[Spec], bool] | None = None,
     vectors: Mapping[str, str] | None = None,
 ) -> Counterexample | None:
-    """The smallest refutation by (bodies, degrees of freedom), or None if none was found within the budget (CPU seconds).
+    """Return the smallest refutation by (bodies, degrees of freedom), or None if none was found within the budget (CPU seconds).
 
     Parameters
     ----------
-    found : a refutation to start from; one is looked for in the family of random trees if left out
+    found : a refutation to start from; default: search the family of random trees
     meets : hypotheses that the models must meet
-    allowed : says of a model whether it may be tried, besides
-    vectors : the spaces of the vectors that the text names. One in a space that no other model has (of nodes, of a user's own)
-        is on its own model alone: None at once.
+    allowed : further predicate on the models
+    vectors : spaces of the vectors in the text. A vector in a space that no other model has (of nodes, or a user's own)
+        exists only on its own model: returns None at once.
     """
     if not {"Θ", "V", "F"}.issuperset((vectors or {}).values()):
         return None
@@ -289,7 +289,7 @@ def smallest(
 
 
 def _letters(side: Any) -> frozenset[str]:
-    """Names of the letters of a side."""
+    """Return the names of the letters of a side."""
     if isinstance(side, _core.Scalar):
         return frozenset().union(*(_letters(e) for e in side.operands()))
     if not isinstance(side, _core.Operator):

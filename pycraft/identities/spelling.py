@@ -1,4 +1,4 @@
-r"""Spellings: what people type, Unicode or LaTeX, brought to the ASCII names and suffixes that the grammar of statements knows.
+r"""Spellings: typed Unicode or LaTeX, converted to the ASCII names and suffixes of the grammar of statements.
 
 Three tables of patterns are applied in order: layout and text of LaTeX (``\left``, ``\mathrm{tr}``, ``\begin{align}``), its letters (fonts,
 Greek, accents), and Unicode with the exponents of both. Every character of the result remembers where it was typed, so that an error
@@ -21,14 +21,14 @@ Rule = tuple[re.Pattern[str], Replacement]
 
 @dataclass
 class Spelled:
-    """Text in the grammar's spelling; `origins[i]` is where character i was typed in `typed` (one more at the end)."""
+    """Text in the grammar's spelling; `origins[i]` is the place of character i in `typed` (one more at the end)."""
 
     typed: str
     text: str
     origins: list[int]
 
     def rewrite(self, rule: Rule) -> None:
-        """Replace every match of a rule; what replaces it stems from where the match began."""
+        """Replace every match of a rule; the origin of the replacement is the start of the match."""
         pattern, replacement = rule
         pieces, origins, end = [], [], 0
         for match in pattern.finditer(self.text):
@@ -43,14 +43,14 @@ class Spelled:
             self.origins = origins + self.origins[end:]
 
     def apply(self, table: list[Rule]) -> bool:
-        """Rewrite by every rule of a table in order; whether anything changed."""
+        """Rewrite by every rule of a table in order; return True if anything changed."""
         before = self.text
         for rule in table:
             self.rewrite(rule)
         return self.text != before
 
     def place(self, at: int) -> str:
-        """The typed line in which character `at` lies, and a caret below the place."""
+        """Return the typed line with character `at`, and a caret below the place."""
         while at < len(self.text) and self.text[at].isspace():
             at += 1
         origin = self.origins[min(at, len(self.text))]
@@ -63,7 +63,7 @@ class Spelled:
 
 
 _GROUP = r"\{((?:[^{}]|\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\})*)\}"
-"""Braces of LaTeX with what stands in them, other braces too."""
+"""Braces of LaTeX with their content, including nested braces."""
 _ALONG = r"\\partial\s*\{?\s*\\(?:theta|beta|q)\s*_\s*\{?\s*([a-n])\s*\}?\s*\}?"
 _INDEX = r"\{?\s*(?:θ|\\theta)\s*_\s*\{?\s*([a-n])\s*\}?\s*\}?"
 
@@ -92,7 +92,7 @@ def _word(found: re.Match[str]) -> str:
 
 
 def _derived(found: re.Match[str]) -> str:
-    r"""What stands behind the d of \frac{dX}{dt}, the ∂ of \frac{\partial X}{\partial\theta_i}."""
+    r"""The operand of the d of \frac{dX}{dt}, the ∂ of \frac{\partial X}{\partial\theta_i}."""
     return re.sub(r"^\s*(?:\\partial(?:\s*\^\s*\{?2\}?)?|(?:\\mathrm\s*)?\{\s*d\s*\}|\\mathrm\s+d|d)", "", found[1]).strip()
 
 
@@ -156,7 +156,7 @@ _GREEK = {
     "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "pi": "π", "rho": "ρ", "varrho": "ρ", "sigma": "σ", "chi": "χ", "omega": "ω",
     "Gamma": "Γ", "Xi": "Ξ", "Phi": "Φ", "Psi": "Ψ", "varGamma": "Γ", "varXi": "Ξ", "varPhi": "Φ", "varPsi": "Ψ",
 }  # fmt: skip
-# Letters that another font makes another operator. 𝒱 alone is the velocity V; 𝒱 under an accent Ṽ or V̄.
+# Letters that denote another operator in another font. 𝒱 alone is the velocity V; 𝒱 under an accent Ṽ or V̄.
 _SCRIPT = {
     "mathcal C": "𝒞",
     "mathscr C": "𝒞",
@@ -196,7 +196,7 @@ _LATEX_LETTERS = _rules(
     ]
 )
 
-# What is left under an accent is more than a letter: a dot over a product is its rate.
+# Remaining accents are over more than a letter: a dot over a product is its rate.
 _RATES = _rules([(rf"\\dot(?![A-Za-z])\s*{_GROUP}", r"(∂_t(\1))"), (r"\\vec(?![A-Za-z])\s*", "")])
 
 # ------------------------------------------------------------------ Unicode, and exponents however they are typed
@@ -242,12 +242,12 @@ _SIGNS = {
     "−": "-", "–": "-", "×": "·", "⋅": "·", "∙": "·", "∘": "·", "•": "·", "∗": "*", "⋆": "*", "≡": "=", "≜": "=", "≝": "=", "∆": "Δ",
     "≻": ">", "⪰": "≥", "≽": "≥", "⩾": "≥", "≺": "<", "⪯": "≤", "≼": "≤", "⩽": "≤",
 }  # fmt: skip
-# Letters of other alphabets that stand for the book's: the symbol forms of φ, θ, Υ.
+# Letters of other alphabets for the book's letters: the symbol forms of φ, θ, Υ.
 _VARIANTS = {"ϕ": "φ", "ϑ": "θ", "ϒ": "Υ", "Ω": "Ω", "𝓜": "ℳ", "𝒱": "V", "𝟙": "I"}
 
 
 def _plain_letter(found: re.Match[str]) -> str:
-    """Mathematical alphabets (𝒟, 𝐌, 𝜙, ℰ) as plain letters, but for those that are operators of their own (ℳ, 𝒥, 𝓑)."""
+    """Mathematical alphabets (𝒟, 𝐌, 𝜙, ℰ) as plain letters, except separate operators (ℳ, 𝒥, 𝓑)."""
     letter = found[0]
     if letter in _OWN_LETTERS or letter in _VARIANTS:
         return _VARIANTS.get(letter, letter)
@@ -268,9 +268,9 @@ OTHER_GREEK = {
     "λ": "lamda", "μ": "mu", "µ": "mu", "ν": "nu", "ξ": "xi", "π": "pi", "ρ": "rho", "σ": "sigma", "χ": "chi", "ω": "omega",
     "Γ": "Gamma", "Ξ": "Xi", "Φ": "Phi", "Ψ": "Psi",
 }  # fmt: skip
-"""Greek letters that the table has not; lambda is a word of Python's, lamda is Unicode's name of the letter."""
+"""Greek letters that the table lacks; lambda is a Python keyword, lamda is the Unicode name of the letter."""
 GREEK = {*OTHER_GREEK.values()}
-"""Names of Greek letters that stand for nothing by themselves."""
+"""Names of Greek letters without a meaning of their own."""
 _ACCENT_NAMES = {
     "\u0303": "_tilde", "\u0304": "_bar", "\u0305": "_bar", "\u0307": "_dot", "\u0308": "_ddot", "\u0302": "_hat", "\u0332": "_underline",
     "\u030c": "_check", "\u0306": "_breve",
@@ -280,7 +280,7 @@ _SUBSCRIPT = r"((?:_(?:plus|\d+|\w))?)"
 
 
 def _apart(found: re.Match[str]) -> str:
-    """Split a letter and its accents into characters, except those of the table."""
+    """Split a letter and its accents into characters, except letters of the table."""
     letter = found[0]
     return letter if letter in _IN_ASCII else unicodedata.normalize("NFD", letter)
 
@@ -297,7 +297,7 @@ def _accented(found: re.Match[str]) -> str:
 
 
 def _only_others(found: re.Match[str]) -> str:
-    """`_accented`, of what is no letter of the table."""
+    """Do `_accented` for letters outside the table."""
     return found[0] if unicodedata.normalize("NFC", found[0]) in _IN_ASCII else _accented(found)
 
 
@@ -361,7 +361,7 @@ _OF_COORDINATE = re.compile(r"(?<=∂_)[a-n](?![a-z0-9_])|(?<=Delta\()[a-n](?=\)
 
 
 def _rename_indices(spelled: Spelled) -> None:
-    """Coordinates by any letters as i and j, in the order in which they stand: ∂_k alone is ∂_i."""
+    """Rename coordinate letters to i and j, in order of appearance: ∂_k alone is ∂_i."""
     found = list(dict.fromkeys(_OF_COORDINATE.findall(spelled.text)))
     if len(found) <= 2 and not {*found} <= {"i", "j"}:
         spelled.rewrite((_OF_COORDINATE, lambda m: "ij"[found.index(m[0])]))
@@ -390,7 +390,7 @@ def _spelled(typed: str) -> tuple[str, tuple[int, ...]]:
 
 
 def spelled(text: str) -> Spelled:
-    """A statement's text in the grammar's spelling. What no rule knows is left as it is, for the grammar to point at."""
+    """Return a statement's text in the grammar's spelling. Unknown text is left unchanged, so that the grammar can point at it."""
     typed = unicodedata.normalize("NFC", text)
     new, origins = _spelled(typed)
     return Spelled(typed, new, list(origins))

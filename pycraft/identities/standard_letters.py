@@ -1,7 +1,7 @@
-"""Vectors and matrices of the equations of motion that have letters in the book, by the operators that make them.
+"""Vectors and matrices of the equations of motion with letters in the book, defined by operators.
 
-They are written in the letters of the operator table and in each other, in the grammar's spelling. A letter with several meanings has the
-one whose spaces fit, the first of them where several do: C is the vector of Coriolis and gyroscopic forces, or the matrix of which C θ̇ is
+They are written in the letters of the operator table and in each other, in the grammar's spelling. Of several meanings of a letter, the
+first with matching spaces applies: C is the vector of Coriolis and gyroscopic forces, or the matrix for which C θ̇ is
 that vector (the Christoffel matrix; so ℳ̇ - 2C is skew).
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class StandardLetter:
-    """A letter: how it is shown, its name in words, and its meanings, one or several."""
+    """A letter: its display, its name in words, and one or several meanings."""
 
     text: str
     meaning: str
@@ -40,6 +40,6 @@ STANDARD = {
     "V_plus": StandardLetter("V⁺", "velocities carried from the parent", ("E^* velocity",)),
     "z_plus": StandardLetter("z⁺", "residual forces on the inboard side", ("z + G epsilon",)),
 }
-"""By the names that the grammar of statements has for them."""
+"""The letters by their names in the grammar of statements."""
 GUARDED = {f"{name}{rate}" for name in STANDARD for rate in ("", "_dot") if len(name) > 1 and not name.startswith(("C_", "V_", "z_"))}
-"""Words that are letters only where no other letter stands before them: zeta holds no eta."""
+"""Words that are letters only if no other letter precedes them: zeta does not contain eta."""

@@ -1,4 +1,4 @@
-"""Where a statement is true: its truth map over chains and trees, J, hinge kinds and bases, and the hypotheses that follow from it."""
+"""Truth map of a statement over chains and trees, J, hinge kinds and bases, and the hypotheses that follow from it."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _WORDS = {HOLDS: TRUE, FAILS: FALSE, UNDECIDED: UNDECIDED}
 
 @dataclass
 class CellTruth:
-    """What was found in one cell: "true", "FALSE", "undecided", or "not said" where no model has what the statement names."""
+    """Finding in one cell: "true", "FALSE", "undecided", or "not said" if no model has everything the statement names."""
 
     cell: Cell
     verdict: str
     models: int
     example: Counterexample | None = None
-    """The smallest case that was found, of a false one."""
+    """The smallest case found, for a false cell."""
 
     @property
     def word(self) -> str:
-        """The verdict, with the smallest case of a false one."""
+        """The verdict, with the smallest case of a false cell."""
         if self.example is None:
             return self.verdict
         kinds = self.example.kinds
@@ -51,18 +51,18 @@ class CellTruth:
 
 @dataclass
 class TruthMap:
-    """Where a statement is true. As a condition: true where it is true in every cell. See `truth`.
+    """Truth map of a statement. As a condition: true if it is true in every cell. See `truth`.
 
-    Iterating gives the cells; `map[shape, J, hinges, base]` is one of them; `.where` the fewest hypotheses under which it is true.
+    Iterating gives the cells; `map[shape, J, hinges, base]` is one of them; `.where` are the fewest hypotheses under which it is true.
     """
 
     statement: str
     cells: list[CellTruth]
     seconds: float = 0.0
     understood: str = ""
-    """How the text was read, in the package's own letters."""
+    """The text as read, in the package's own letters."""
     partial: bool = False
-    """Whether a budget ended before the large models of every cell were tried."""
+    """True if a budget ended before the large models of every cell were tried."""
 
     def __iter__(self) -> Iterator[CellTruth]:
         return iter(self.cells)
@@ -75,7 +75,7 @@ class TruthMap:
 
     @property
     def where(self) -> list[frozenset[str]]:
-        """The sets of hypotheses, each without one to spare, under which it is true in every cell; [frozenset()] if it is true without."""
+        """Minimal sets of hypotheses under which it is true in every cell; [frozenset()] if it is true without any."""
         found: list[frozenset[str]] = []
         for size in range(len(HYPOTHESES) + 1):
             for chosen in map(frozenset, itertools.combinations(HYPOTHESES, size)):
@@ -89,7 +89,7 @@ class TruthMap:
 
     @property
     def needs_rotor_inertia(self) -> bool:
-        """Whether an inverse in it exists where J > 0, and on no model without rotor inertia."""
+        """True if an inverse in it exists for J > 0, but on no model without rotor inertia."""
         read = {c.cell.J for c in self.cells if c.verdict != UNREAD}
         return read == {WITH_J}
 
@@ -108,7 +108,7 @@ class TruthMap:
         return "FALSE in every cell" if any(c.verdict == FALSE for c in self.cells) else "undecided"
 
     def table(self) -> Any:
-        """The map as a rich table: a row for each shape, J and base, a column for the hinges."""
+        """Return the map as a rich table: a row for each shape, J and base, a column for the hinges."""
         from rich.table import Table
         from rich.text import Text
 
@@ -131,13 +131,13 @@ class TruthMap:
         return truth_html(self)
 
     def plot(self, ax: Any = None) -> Any:
-        """The map as a picture: true and false tiles, in the false ones the smallest cases drawn as trees; returns the axes."""
+        """Draw the map: true and false tiles, with the smallest cases drawn as trees in the false ones; return the axes."""
         return truth_plot(self, ax)
 
     def save(self, path: Any) -> Path:
         """Write the map: as a page (".html") or as the picture of `plot` (".png", ".svg", ".pdf").
 
-        EvaluationError for another ending, OSError where it cannot be written.
+        Raises EvaluationError for another ending, OSError if it cannot be written.
         """
         target = writable_target(path, (".html", *PICTURES), "a truth map")
         if target.suffix == ".html":
@@ -151,12 +151,12 @@ class TruthMap:
 
 
 def implied(chosen: frozenset[str]) -> frozenset[str]:
-    """The hypotheses with those that they imply: hinges of one coordinate have a constant H."""
+    """Return the hypotheses with their implications: hinges of one coordinate have a constant H."""
     return chosen | {"constant H"} if "single-DOF hinges" in chosen else chosen
 
 
 def in_words(chosen: Iterable[str]) -> str:
-    """Hypotheses as they are said."""
+    """Return hypotheses in words."""
     says = {
         "serial chain": "the tree is a serial chain",
         "constant H": "H is constant",
@@ -179,28 +179,28 @@ def truth(
     dialect: str | None = None,
     progress: bool = True,
 ) -> TruthMap:
-    """The truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
+    """Return the truth map of a statement: where it is true, over chains and trees, J, hinge kinds and bases.
 
     Parameters
     ----------
-    statement : as text, see `check`. Names are those of random trees: "body0", "hinge0", "node0", ...
-    smallest_case : look for the smallest case in each false cell
-    precision : the first scalar beside double
-    budget : CPU seconds for the smallest cases, of all cells together
+    statement : text, see `check`. Names as in random trees: "body0", "hinge0", "node0", ...
+    smallest_case : True searches the smallest case in each false cell
+    precision : the first scalar after double
+    budget : CPU seconds for the smallest cases of all cells together
     vectors : names of the vectors in the text, and of their spaces, "Θ", "V" or "F"
-    dialect : the school in whose letters it is written, see `check`
-    progress : whether a bar is shown in a terminal or notebook if it takes more than a second
+    dialect : notation of the statement, see `check`
+    progress : True shows a bar in a terminal or notebook after a second
 
     Returns
     -------
     TruthMap
-        It prints as a table, shows as one in a notebook, `.plot()` draws it, `.save(path)` writes it; `.where` are the fewest
+        It prints as a table, also in a notebook, `.plot()` draws it, `.save(path)` writes it; `.where` are the fewest
         hypotheses under which it is true.
 
     Raises
     ------
     ParseError
-        No model of the family has what the statement names, or it does not read as a statement.
+        No model of the family has everything the statement names, or the text is not a statement.
 
     Examples
     --------
@@ -225,7 +225,7 @@ def truth(
 
 
 def depth_for(statement: str, vectors: Mapping[str, str] | None = None) -> int:
-    """How deep the deep models must be for no product to vanish by its depth alone; raises ParseError where no model can be spoken of."""
+    """Return the depth of the deep models so that no product vanishes only by depth. Raises ParseError if no model fits the statement."""
     deepest = 0
     refused: Exception | None = None
     for spec in family(1):
@@ -258,8 +258,8 @@ def truth_within(
     vectors: Mapping[str, str] | None = None,
     progress: bool = True,
 ) -> TruthMap | None:
-    """The truth map without smallest cases. Every cell is tried on a small model first; where the budget ends after that and before the
-    large ones were tried, the map is `partial`, and None where it ends earlier."""
+    """Return the truth map without smallest cases. Every cell is tried on a small model first; if the budget ends after that and before the
+    large ones were tried, the map is `partial`; None if it ends earlier."""
     begin = time.perf_counter()
     depth = depth_for(statement, vectors)
     cells = [_CellTrial(cell) for cell in CELLS]
@@ -281,7 +281,7 @@ def truth_within(
 
 
 class _CellTrial:
-    """The models of a cell one after the other, up to the first that refutes."""
+    """The models of a cell one after another, up to the first that refutes."""
 
     def __init__(self, cell: Cell):
         self.cell = cell
@@ -306,7 +306,7 @@ class _CellTrial:
 
 
 def saving(found: TruthMap, traits: Callable[[], dict[str, bool]] | None = None) -> list[frozenset[str]]:
-    """The hypotheses under which a statement that was refuted is true; not those that the refuting model meets (`traits`)."""
+    """Return hypotheses under which a refuted statement is true, except those that the refuting model meets (`traits`)."""
     met = {name for name, is_met in traits().items() if is_met} if traits is not None else set()
     return [chosen for chosen in found.where if chosen and not chosen <= met]
 
@@ -321,9 +321,9 @@ def explained(
     traits: Callable[[], dict[str, bool]] | None = None,
     vectors: Mapping[str, str] | None = None,
 ) -> tuple[TruthMap | None, Counterexample | None]:
-    """(the truth map of a false statement, the case that tells most): the smallest of all where a hypothesis saves it; else the
-    smallest that meets all hypotheses under which it still fails, so that it is not blamed on what the true formula does not hold for
-    either. No map where the budget, CPU seconds for each of the two, ends before every cell was tried on one model."""
+    """Return the truth map of a false statement and the most informative case: the smallest of all if a hypothesis makes it true; else the
+    smallest that meets all hypotheses and still refutes, so that the failure cannot be due to a violated hypothesis of the true
+    formula. No map if the budget, CPU seconds for each of the two, ends before every cell was tried on one model."""
     found_map = truth_within(statement, Budget(budget), precision, vectors)
     saved = saving(found_map, traits) if found_map is not None else []
     start: Counterexample | None = found

@@ -1,7 +1,7 @@
-"""The words of statements: operators by their typed names, functions, powers; and the errors of text that cannot be read.
+"""The vocabulary of statements: operators by their typed names, functions, powers; and errors for unreadable text.
 
-A name is looked for among the definitions of the statement, what the caller adds, the letters of the operator table, those of the
-equations of motion (`standard_letters`) and of parts (`part_letters`), in this order; X_dot is the rate ∂_tX where no letter is called so.
+A name is looked up in the definitions of the statement, the caller's additions, the letters of the operator table, of the
+equations of motion (`standard_letters`) and of parts (`part_letters`), in this order; X_dot is the rate ∂_tX if no letter has this name.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from .standard_letters import STANDARD
 
 
 class Written:
-    """An operator that is written and not worked out, such as a derivative that is to be proved equal to something.
+    """An operator that is written but not evaluated, such as a derivative in a statement to prove.
 
     It has a domain, a codomain and a text as operators have.
     """
 
     def blockdiag(self) -> Written:
-        """Its diagonal blocks."""
+        """Return its diagonal blocks."""
         raise NotImplementedError
 
 
@@ -54,7 +54,7 @@ WITH_ARGUMENTS = tuple(s.name for s in _core.symbols if s.takes != "nothing")
 LARGEST_POWER = 1000
 
 _NAMES = {s.name for s in _core.symbols}
-# What stands for a letter in ASCII where its own name is another: X, V; E_phi; and names typed without their underscores: taubar, Epsi.
+# ASCII aliases of letters: X, V; E_phi; and names typed without underscores: taubar, Epsi.
 _ALIASES = {
     **{s.text: s.name for s in _core.symbols if s.text != s.name and s.text.isascii()},
     **{name.replace("_", ""): name for name in _NAMES if "_" in name},
@@ -70,15 +70,15 @@ def is_known(name: str) -> bool:
 
 
 class ParseError(_core.EvaluationError):
-    """A statement that cannot be read, or that can be read in two ways."""
+    """A statement is unreadable or ambiguous."""
 
 
 class SpacesError(ParseError):
-    """A statement of operators whose spaces do not fit: it cannot be true, on any model."""
+    """The spaces of a statement of operators do not match: it cannot be true on any model."""
 
 
 class Misread(ParseError):
-    """What one reading stumbles over, at character `at` of the spelled text."""
+    """An error of one reading, at character `at` of the spelled text."""
 
     def __init__(self, message: str, at: int):
         super().__init__(message)
@@ -86,18 +86,18 @@ class Misread(ParseError):
         self.at = at
 
     def place(self, source: Spelled) -> str:
-        """The typed line and a caret below the place, indented."""
+        """Return the typed line and a caret below the place, indented."""
         return "".join(f"\n    {line}" for line in source.place(self.at).split("\n"))
 
 
 Read = Callable[[str, "Vocabulary", str], Any]
-"""What a text defines, in the words of a vocabulary, as the letter of a name."""
+"""Reads the definition of a letter from text, in a vocabulary, under a name."""
 
 
 class Vocabulary:
-    """The operators of one model by every name that is typed for them, ℳ, I, N, and what the caller adds.
+    """The operators of one model by all typed names, ℳ, I, N, and the caller's additions.
 
-    `derive(x, direction, operators)` is what ∂ makes of an expression, see `directions.along`; `read` makes one of a definition's text.
+    `derive(x, direction, operators)` evaluates ∂ of an expression, see `directions.along`; `read` parses the text of a definition.
     """
 
     def __init__(
@@ -127,13 +127,13 @@ class Vocabulary:
         return other
 
     def with_letters(self, definitions: Sequence[Any], choice: Mapping[str, int]) -> Vocabulary:
-        """The same words and those of definitions; of letters with several meanings those that are chosen."""
+        """Return the same vocabulary with definitions, and with the chosen meanings of ambiguous letters."""
         other = self._as(definitions=tuple(definitions), choice=choice, made={})
         other.used = {}
         return other
 
     def choices(self, text: str) -> Iterator[dict[str, int]]:
-        """The meanings that letters of a text may have."""
+        """Yield possible meanings of the letters of a text."""
         meanings = {name: len(known.meanings) for name, known in STANDARD.items() if name not in self._own}
         meanings |= {d.name: 1 + len(d.others) for d in self._definitions}
         several = {name: count for name, count in meanings.items() if count > 1 and name in text}
@@ -142,12 +142,12 @@ class Vocabulary:
 
     @property
     def own(self) -> set[str]:
-        """Names that are not the table's."""
+        """Names outside the table."""
         return {*self._own, *(d.name for d in self._definitions)}
 
     @property
     def names(self) -> set[str]:
-        """Names that stand alone, without arguments."""
+        """Names without arguments."""
         loops = getattr(self._operators._model, "loops", ())
         letters = {*_NAMES, *_ALIASES, *STANDARD, *(PARTS if len(loops) else PARTS - {"Q", "A"}), *self.own}
         numbers = {"I", "N"} - {d.name for d in self._definitions}
@@ -174,7 +174,7 @@ class Vocabulary:
         if name in _ALIASES:
             return self.operator(_ALIASES[name])
         if name in STANDARD:
-            # Of the definitions in force those of the equations of motion reach others of them: z is made with the T that is given.
+            # Definitions of letters of the equations of motion also apply within other such letters: z uses the given T.
             among = tuple(d for d in self._definitions if d.name in STANDARD and not d.of_the_book)
             scope = dict(definitions=among, own=self._of_the_book())
             return self._defined(name, STANDARD[name].meanings[self._choice.get(name, 0)], scope)
@@ -192,12 +192,12 @@ class Vocabulary:
         raise ParseError(self.unknown(name))
 
     def _of_the_book(self) -> dict[str, Any]:
-        """Return what the caller adds, except letters of the table with another meaning: of these no letter of the book is made."""
+        """Return the caller's additions, except letters of the table with another meaning, which must not define letters of the book."""
         own = {name: value for name, value in self._own.items() if name in STANDARD or name not in _NAMES}
         return own | {"MM": self._base["MM"], "I": self._base["I"], "N": self._base["N"]}
 
     def _of_any(self, name: str) -> Any:
-        """A letter without its arguments: of any nodes, Δ of the coordinate i."""
+        """Return a letter without arguments: for any nodes, and Δ for the coordinate i."""
         if name == "Delta":
             return self.indexed(name, [COORDINATES[0]])
         return getattr(self._operators, name)(any_nodes(self._operators))
@@ -209,14 +209,14 @@ class Vocabulary:
             raise ParseError(f"{name} is defined by itself")
         if key not in self._made:
             if self._read is None:
-                raise ParseError(f"{name} is defined by text, and nothing reads it here")
+                raise ParseError(f"{name} is defined by text, which cannot be read here")
             self._made[key] = self._read(what, self._as(**scope, open=(*self._open, key)), name)
         value = self._made[key]
         self.used.setdefault(name, (what, value))
         return value
 
     def standing_for_themselves(self) -> Vocabulary:
-        """The same words, letters that were used and defined by letters of their own, with no more than a name and spaces."""
+        """Return the same vocabulary, with used and defined letters replaced by plain letters that have only a name and spaces."""
         extra = {}
         translated = {d.name for d in self._definitions if d.of_the_book}
         for name, (_, value) in self.used.items():
@@ -251,11 +251,11 @@ class Vocabulary:
         return self._derive(x, direction, self._operators)
 
     def unknown(self, name: str) -> str:
-        """What to say of a name that stands for nothing."""
+        """Return the message for an unknown name."""
         if name == "det":
-            return "a determinant is read by its logarithm, ln det A, or where both sides are products of determinants"
+            return "write a determinant as its logarithm, ln det A, or make both sides products of determinants"
         if name.startswith("\\"):
-            return f"the command {name.partition('_')[0]} is not known here"
+            return f"the command {name.partition('_')[0]} is unknown here"
         for ending, remedy in _ENDINGS.items():
             if name.endswith(ending) and name.removesuffix(ending) in self.names:
                 return remedy.format(name.removesuffix(ending), name)
@@ -289,16 +289,16 @@ _ENDINGS = {
     "_hat": "{0} has no hat in the book: define {1} := …",
 }
 LARGEST_SHOWN = 200
-"""Rows and columns of matrices that stand for a letter where a statement is shown as it was read."""
+"""Size of the matrices that represent letters when a statement is shown as read."""
 
 
 def decimal(text: str) -> Fraction:
-    """A number as it is typed: 0.3 is 3/10.
+    """Return a number as typed: 0.3 is 3/10.
 
     Raises
     ------
     ParseError
-        It is beyond the range of a double.
+        The number is beyond the range of a double.
     """
     text = text.replace("_", "")
     if not math.isfinite(near := float(text)) or near == 0 and any(c in "123456789" for c in text.lower().partition("e")[0]):
@@ -307,23 +307,23 @@ def decimal(text: str) -> Fraction:
 
 
 def is_number(x: object) -> TypeGuard[float | Fraction]:
-    """A real number and no scalar expression; NumPy's count."""
+    """Return True for a real number, including NumPy's, that is not a scalar expression."""
     return isinstance(x, Real)
 
 
 def is_operator(x: object) -> bool:
-    """An operator, worked out or not; no number and no scalar expression."""
+    """Return True for an operator, evaluated or not, but not for numbers and scalar expressions."""
     return isinstance(x, (_core.Operator, Written))
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """base to a whole power.
+    """Return base to a whole power.
 
     Raises
     ------
     ParseError
-        The exponent is no whole number, or beyond 1000.
+        The exponent is not a whole number, or exceeds 1000.
     """
     if not is_number(exponent) or not -LARGEST_POWER <= exponent <= LARGEST_POWER or exponent != int(exponent):
-        raise ParseError(f"a power is a whole number up to {LARGEST_POWER}")
+        raise ParseError(f"a power must be a whole number up to {LARGEST_POWER}")
     return base ** int(exponent)

@@ -30,7 +30,7 @@ _SAYS = {DEFINITE: "> 0", SEMIDEFINITE: "≥ 0"}
 
 
 class Grades:
-    """What is known to be positive of the letters and words of one problem."""
+    """Letters and words known to be positive, of one problem."""
 
     def __init__(self, problem: DerivativeProblem):
         self._problem, self.alphabet = problem, problem.alphabet
@@ -89,7 +89,7 @@ class InequalityProof(Proof):
         self.note = f"every term is a congruence X*AX: {grades.reason(form)}" if self._found and grades is not None else ""
 
     def recheck(self) -> bool:
-        """Whether every step follows from the equations that it names, and every term that they lead to is positive."""
+        """Return True if every step follows from the equations that it names, and every term that they lead to is positive."""
         if self._grades is None or self._grades.of(self._forms[0]) < self._wanted:
             return False
         return chain_holds(self.steps, self._difference, self._forms[0]) and all(e.holds() for e in self.rests_on)

@@ -1,4 +1,4 @@
-"""What rotors add to the equations of motion, as letters of proofs: of every model, whatever its hinges.
+"""Terms of rotors in the equations of motion, as letters of proofs: of every model, whatever its hinges.
 
 The Coriolis matrix of rotors is skew, C_J* = -C_J, and zero with J; b_J = C_J θ̇. Where J is regular it is ΓJ - JΓ*, with Γ = ½C_J J⁻¹.
 What is proved of every Γ holds where J is singular as well: both sides are continuous in J as long as D is regular.

@@ -217,7 +217,7 @@ def read_back(model, text):
     try:
         return Statements(model.soa).read(text).lhs
     except ParseError as error:
-        assume("reads in two ways" not in str(error))
+        assume("is ambiguous" not in str(error))
         raise
 
 

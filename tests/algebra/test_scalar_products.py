@@ -141,7 +141,7 @@ def test_what_wants_rotor_inertia_says_so():
     report = pc.check("J⁻¹ J = I", plain)
     assert not report and report.verdict == "undefined" and report.true_where == [frozenset({"J > 0"})]
     assert "TRUE where J > 0" in repr(report) and "hinge0" in repr(report)
-    assert pc.check("J⁻¹ J = I", geared) and "said where J > 0" in repr(pc.check("J⁻¹ J = I", states=12))
+    assert pc.check("J⁻¹ J = I", geared) and "checked where J > 0" in repr(pc.check("J⁻¹ J = I", states=12))
     assert "TRUE where J > 0" in pc.truth("J⁻¹ J = I", smallest_case=False).verdict
     false = pc.check("J⁻¹ D = D", plain)
     assert not false and "FALSE where J > 0" in repr(false)

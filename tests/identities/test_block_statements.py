@@ -110,7 +110,7 @@ def test_relations_on_a_tree():
 ERRORS = [
     ("Ω(i,j) = ψ*(c,i?)Υ(c)ψ(c,j)", "not understood at", "c,i?)"),
     ("Ω(i,j) = Υ(i)ψ(i,j) + )", "not understood at '.'", ")"),
-    ("Ω(i,j) = Υ(i)ψ(i,j), i beside j", "what may be said is", "i beside"),
+    ("Ω(i,j) = Υ(i)ψ(i,j), i beside j", "write relations such as", "i beside"),
     ("Ω(i,j) = Υ(i)ψ(i,j), q above j", "no body of the statement is called q", "q above"),
     ("Ω(i,j) = ψ⁻¹(i,j)", "write inv", None),
     ("D(k) = D(k)*H(k).T", "write @ to multiply", None),
@@ -120,7 +120,7 @@ ERRORS = [
     ("Ω(i,j) = Ω(j,i)", "the left side leads from F of body j to V of body i", None),
     ("Ω(k) = Υ(k)", "has blocks between two bodies", None),
     ("V(i,j) = V(i)", "blocks have one body", None),
-    ("D(k)² = D(k)", "of blocks there are", None),
+    ("D(k)² = D(k)", "blocks support", None),
     ("φ(i,j) = 0, i above j and j above i", "satisfy its relations", None),
 ]
 
@@ -152,7 +152,7 @@ def test_named_bodies():
 
 def test_what_does_not_take_them_says_so():
     for call in (pc.truth, pc.repair):
-        with pytest.raises(pc.EvaluationError, match="statements by block are not mapped or repaired"):
+        with pytest.raises(pc.EvaluationError, match="truth and repair do not support statements by block"):
             call("Ω(i,j) = Υ(i)ψ(i,j), i above j")
     with pytest.raises(pc.EvaluationError, match="without a form in operators"):
         prove("Ω(i,j) = Υ(i)ψ(i,j), i above j")

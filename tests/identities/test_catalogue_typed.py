@@ -1,4 +1,4 @@
-"""What the catalogue prints can be typed: every text is read, and has the verdict of its theorem."""
+"""The printed catalogue can be typed: every text is read, and has the verdict of its theorem."""
 
 import numpy as np
 import pytest

@@ -62,7 +62,7 @@ def test_what_takes_equations_alone_says_so():
 
 
 def test_the_least_pivot_is_that_of_the_signs():
-    """Sylvester: the signs of the pivots are those of the eigenvalues."""
+    """Sylvester: pivots have the signs of the eigenvalues."""
     rng = np.random.default_rng(0)
     for signs in ([1, 1, 1, 1], [1, 1, 1, -1], [1, 0, 0, 0], [0, 0, 0, 0], [1, 1, 0, -1]):
         x = rng.normal(size=(4, 4))

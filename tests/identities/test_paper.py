@@ -78,8 +78,8 @@ def test_the_books_formulas_are_true_under_their_hypotheses(judged):
         (r"M = H\phi M\phi^*H^*", "fails", "spaces do not fit"),
         (r"\mathcal D = \ln\det \mathcal M", "fails", "one is an operator, the other a number"),
         ("G(k) = P(k) D(k)", "fails", "spaces do not fit"),
-        ("I = I", "not read", "said of no space"),
-        ("1 = 2", "not read", "numbers alone"),
+        ("I = I", "not read", "has no space"),
+        ("1 = 2", "not read", "not only numbers"),
     ],
 )
 def test_spaces_that_do_not_fit_fail(judged, text, verdict, words):

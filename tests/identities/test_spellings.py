@@ -88,8 +88,8 @@ MISREAD = [
     ("D \\ D", "a left division is not read: A \\\\ B is inv\\(A\\) B", 2),
     ("HψMψ*H* = Q", "Q is a letter of models with loops", 10),
     ("H ph M", "no operator is called 'ph'; the nearest names are φ", 2),
-    (r"\phi \foo D", r"the command \\foo is not known here", 5),
-    ("φ = det(D)", "a determinant is read by its logarithm, ln det A", 4),
+    (r"\phi \foo D", r"the command \\foo is unknown here", 5),
+    ("φ = det(D)", "write a determinant as its logarithm, ln det A", 4),
     ("HφMφ*H* = ℳ)", r"not understood at '\)'", 11),
     ("φ M =", "not understood at its end", 5),
     ("φ + [I", "not understood at its end", 6),
@@ -99,7 +99,7 @@ MISREAD = [
     ("D^2^3", "a power of a power needs parentheses", 2),
     ("inv phi", r"inv needs its operand in parentheses: inv\(A\)", 0),
     ("φ† M", "not understood at '†", 1),
-    (r"\int_0^1 D", r"the command \\int is not known", 0),
+    (r"\int_0^1 D", r"the command \\int is unknown", 0),
     ("M_1", "no operator is called 'M_1'", 0),
 ]
 

@@ -110,7 +110,7 @@ def test_ambiguous_text_shows_both_readings(model):
         with pytest.raises(ParseError) as caught:
             pc.check(text, model)
         shown = str(caught.value)
-        assert "reads in two ways and both fit" in shown and f"Python: {python} =" in shown and f"the book: {book} =" in shown
+        assert "is ambiguous; both readings match" in shown and f"Python: {python} =" in shown and f"the book: {book} =" in shown
         assert "write .T for a transpose" in shown
     assert pc.check("phi*psi == phi@psi", model)  # φ*ψ fits only as Python's product: φ* ends in V
 
@@ -128,7 +128,7 @@ def test_what_cannot_be_read_says_why(model):
         ("phi == H", "φ maps F .* they cannot be added"),
         ("phi", "has one side; a statement is lhs == rhs"),
         ("H == 1", "one is an operator, the other a number"),
-        ("1 == 1", "numbers alone"),
+        ("1 == 1", "not only numbers"),
         ("phi != psi", "a statement is lhs == rhs"),
         ("phi == psi == E", "a statement is lhs == rhs"),
         ("HH = H", "H maps F .*cannot follow H"),
@@ -251,12 +251,12 @@ def test_what_is_no_text_is_said(ask, given):
 def test_options_of_a_check_are_checked():
     arm = pc.chain(1)
     for options in ({"states": "x"}, {"states": 2.5}, {"states": 0}, {"seed": "x"}, {"seed": -1}):
-        with pytest.raises(pc.Error, match=f"{next(iter(options))}.*(whole number|one state at least)"):
+        with pytest.raises(pc.Error, match=f"{next(iter(options))}.*(whole number|at least one state)"):
             pc.check("φ = φ", arm, **options)
         if options != {"states": 0}:
             with pytest.raises(pc.Error, match=f"{next(iter(options))}.*whole number"):
                 arm.soa.check(**options)
     with pytest.raises(pc.EvaluationError, match="0 or more"):
         arm.soa.check(states=-2)
-    with pytest.raises(pc.EvaluationError, match="on a model or its operators"):
+    with pytest.raises(pc.EvaluationError, match="check takes a model or its operators"):
         pc.check("φ = φ", 3)

@@ -139,8 +139,8 @@ def test_pickled_with_their_model():
         (lambda m: m.soa.Q.diff(0, 1, 2), "rows of loops are differentiated twice"),
         (lambda m: m.soa.grouped([["body0", "body1"]]).Q, "whole model"),
         (lambda m: m.soa.free(["hinge1"]).A, "whole model"),
-        (lambda m: m.soa.Q.algorithm(), "no recursion is written for Q, rows of loops"),
-        (lambda m: m.soa.Q.compile(), "no recursion is written for Q, rows of loops"),
+        (lambda m: m.soa.Q.algorithm(), "no recursion is written for Q, the rows of loops"),
+        (lambda m: m.soa.Q.compile(), "no recursion is written for Q, the rows of loops"),
         (lambda m: m.soa.Q.at([0.0, np.nan, 0.0]).dense(), "hinge1"),
     ],
 )
