@@ -293,6 +293,8 @@ def accuracy(
             f"cheapest for {error:g}: {escape(table.label(best))}, error {best['error']:.1e}, {table.cell('seconds', best)}",
             highlight=False,
         )
+        if why := getattr(best, "why", ""):
+            console.print(escape(why), highlight=False)
 
 
 @app.command()

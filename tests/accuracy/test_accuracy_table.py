@@ -153,6 +153,30 @@ def test_rows_that_show_their_rounding_say_so(measured):
     assert found["precision"] != "quad"
 
 
+def carrying(ratio):
+    """Five rods with a sixth that is so much heavier."""
+    model = pc.chain(6)
+    tip = model.bodies["body5"]
+    tip.mass, tip.inertia = ratio, ratio * np.asarray(tip.inertia)
+    return model
+
+
+def test_the_fastest_says_why():
+    """Check the sentences on cheaper rows, on refused rows and on the next one that is accurate enough."""
+    options = dict(forms=["fast", "ud"], methods=["articulated"], precisions=["double", "quad"], refinements=0, seconds=0.001)
+    table = accuracy(carrying(1e16), **options)
+    found = table.fastest(1e-12)
+    assert found == next(row for row in table if row["way"] == "ud" and row["precision"] == "double")
+    assert found.why.startswith("ud (") and " is the cheapest with an error of at most 1e-12." in found.why
+    assert "Refused: fast: hinge" in found.why and "feels no inertia" in found.why and "Cheaper" not in found.why
+    assert "The next one that is accurate enough: " in found.why and ", quad (" in found.why
+    found = accuracy(carrying(1e6), **options).fastest(1e-14)
+    assert found["way"] == "ud" and "Refused" not in found.why
+    assert "Cheaper and not accurate enough: fast (" in found.why and ", 1 x fast)" in found.why
+    alone = accuracy(carrying(1.0), **(options | {"precisions": ["quad"], "forms": ["fast"]})).fastest(1)
+    assert "Cheaper" not in alone.why and "next" not in alone.why
+
+
 def test_a_refined_extended_row_spares_quad_on_a_stretched_chain():
     n = 64
     tau = np.random.default_rng(0).normal(size=n)

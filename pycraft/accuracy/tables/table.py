@@ -17,6 +17,21 @@ from ..exact import BITS, dynamics_error, exact_dynamics
 from ..rungs import LADDER, Rung, epsilon, precision_name, reference_of
 from .timing import time_forward_dynamics, workspace_bytes
 
+
+class Choice(dict[str, Any]):
+    """The row of an `AccuracyTable` that `fastest` chose: its keys and values, and `why`.
+
+    `why` is a sentence for each of: the row itself, the cheaper rows that are not accurate enough, those that are refused and by what, and
+    the next dearer row that is accurate enough.
+    """
+
+    why: str
+
+    def __init__(self, row: dict[str, Any], why: str):
+        super().__init__(row)
+        self.why = why
+
+
 STATES = 5
 """Default number of random states."""
 
@@ -48,14 +63,35 @@ class AccuracyTable(TidyTable):
         """The rows of the Pareto front, fastest first."""
         return [row for row in self.rows if row["pareto"]]
 
-    def fastest(self, error: float) -> dict[str, Any]:
-        """The cheapest row whose error is at most `error`. Raises ValueError where none is, and says what the best is."""
+    def fastest(self, error: float) -> Choice:
+        """Return the cheapest row whose error is at most `error`; its `why` says what was cheaper, what was refused and by what.
+
+        Raises ValueError where no row is accurate enough, and says what the best is.
+        """
         answers = [row for row in self.rows if not row["refused"] and row["error"] <= error]
         if not answers:
             best = min((row for row in self.rows if not row["refused"]), key=lambda row: row["error"], default=None)
             found = "every way is refused" if best is None else f"the best is {best['way']} in {best['precision']}, {best['error']:.1e}"
             raise ValueError(f"no row of {self.title!r} has an error of at most {error:g}: {found}")
-        return min(answers, key=lambda row: row["seconds"])
+        best, *dearer = sorted(answers, key=lambda row: row["seconds"])
+        return Choice(best, self._why(error, best, dearer))
+
+    def _why(self, error: float, best: dict[str, Any], dearer: list[dict[str, Any]]) -> str:
+        """The reasons for a choice, a sentence each."""
+
+        def price(row: dict[str, Any]) -> str:
+            return (
+                f"{self.label(row)} ({row['error']:.1e}, {row['cost'] and self.cell('cost', row) + ' fast' or self.cell('seconds', row)})"
+            )
+
+        cheaper = [row for row in self.rows if not row["refused"] and row["seconds"] < best["seconds"]]
+        reasons = [f"{price(best)} is the cheapest with an error of at most {error:g}."]
+        if cheaper:
+            reasons.append(f"Cheaper and not accurate enough: {', '.join(price(row) for row in cheaper)}.")
+        reasons += [f"Refused: {', '.join(labels)}: {reason}." for reason, labels in self.refusals.items()]
+        if dearer:
+            reasons.append(f"The next one that is accurate enough: {price(dearer[0])}.")
+        return " ".join(reasons)
 
     def plot(self, ax: Any = None) -> Any:
         """Plot error against time per evaluation, both logarithmic, with the labelled Pareto front; return the axes."""
