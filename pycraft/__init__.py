@@ -11,7 +11,7 @@ What to type::
     MM.inv().explain()                       # how, and what it costs
     pc.check("inv(psi) == inv(phi) + K*H", arm)        # is it true?
     pc.prove("inv(MM) == (I - H*psi*K).T * inv(D) * (I - H*psi*K)", model=arm)   # and why?
-    arm.forward_dynamics()                   # numbers and no algebra, at the present state
+    arm.forward_dynamics()                   # values without algebra, at the present state
 
 `arm.soa?` lists the operators, docs/notation.md their letters; `pc.Multibody` has the direct calls; on the command line, `pycraft tour`.
 """
@@ -21,10 +21,10 @@ import pkgutil
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
-# In a source checkout the folder `pycraft` hides the installed package: its compiled core is found all the same.
+# In a source checkout the folder `pycraft` hides the installed package: find its compiled core all the same.
 if importlib.util.find_spec("pycraft._core") is None:
     __path__ = pkgutil.extend_path(__path__, __name__)
-del importlib, pkgutil  # no names of the workbench
+del importlib, pkgutil  # not names of the workbench
 
 from . import _core, face, interop, models
 from ._core import (
@@ -58,7 +58,7 @@ from .state import State
 face.attach()
 del face
 _import_module(f"{__name__}.accuracy")
-del globals()["accuracy"]  # the room, imported here so that no later import of it hides the function of its name
+del globals()["accuracy"]  # the subpackage, imported here so that no later import of it hides the function of the same name
 
 if _TYPE_CHECKING:
     from .accuracy.tables.table import accuracy
@@ -76,7 +76,7 @@ if _TYPE_CHECKING:
     from .sympy_bridge import from_sympy, parse, to_sympy
     from .view.hypothesis_page import hypothesis_switches
 
-# What takes long to import is imported when it is first asked for: the same names, each with its room.
+# Modules that take long to import are imported on first use: the same names, each with its module.
 _LATER = {
     "accuracy.tables.table": ("accuracy",),
     "accuracy.tables.work_precision": ("work_precision",),
@@ -116,7 +116,7 @@ __version__ = "0.1.0"
 
 
 def cmake_dir() -> str:
-    """The folder of `pycraftConfig.cmake`, for C++ users: ``cmake -Dpycraft_DIR=...`` finds `pycraft::core` there."""
+    """Return the folder of `pycraftConfig.cmake`, for C++ users: ``cmake -Dpycraft_DIR=...`` finds `pycraft::core` there."""
     from pathlib import Path
 
     return str(Path(_core.__file__).parent / "lib" / "cmake" / "pycraft")

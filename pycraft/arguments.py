@@ -1,4 +1,4 @@
-"""What users give to models, taken apart before the core checks the numbers: poses, limits, names, lists."""
+"""Read what users give to models, poses, limits, names and lists, before the core checks the values."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 from . import _core
 
 LARGEST = 2**31 - 1
-"""What the core's integers hold."""
+"""The range of the core's integers."""
 
 
 @contextmanager
 def of_state(state: int, states: int) -> Iterator[None]:
-    """What is raised inside tells which state of a batch it is of, as the core's own batches do."""
+    """Add the number of the state in a batch to errors raised inside, as the core's own batches do."""
     try:
         yield
     except _core.Error as error:
@@ -30,35 +30,35 @@ def of_state(state: int, states: int) -> Iterator[None]:
 
 
 def text(name: Any, what: str) -> str:
-    """A name. ModelError where it is no text."""
+    """Return a name. ModelError if it is not a string."""
     if not isinstance(name, str):
-        raise _core.ModelError(f"{what} is called by a text, not by {name!r}")
+        raise _core.ModelError(f"{what} is named by a string, not by {name!r}")
     if any("\ud800" <= c <= "\udfff" for c in name):
-        raise _core.ModelError(f"{what} is called by a text, and {name!r} has half a character, which no file holds")
+        raise _core.ModelError(f"{what} is named by a string, and {name!r} has half a surrogate pair, which no file can store")
     return name
 
 
 def listed(items: Any, what: str) -> list[Any]:
-    """The items of a list. ModelError where it is none."""
+    """Return the items of a list. ModelError if it is not one."""
     if isinstance(items, (str, bytes, dict)) or not isinstance(items, Iterable) or getattr(items, "shape", None) == ():
-        raise _core.ModelError(f"{what}: a list, not {items!r}")
+        raise _core.ModelError(f"{what} must be a list, not {items!r}")
     return list(items)
 
 
 def several(given: Any, alone: type | tuple[type, ...] = str) -> list[Any]:
-    """What is given alone, or several of it in a list, as a list. `alone`: what is one, though it could be gone through."""
+    """Return one item, or several in a list, as a list. `alone`: types that count as one item although they are iterable."""
     return [given] if isinstance(given, alone) or not isinstance(given, Iterable) or getattr(given, "shape", None) == () else list(given)
 
 
 def switch(value: Any, what: str) -> bool:
-    """What is on or off. ModelError where it is neither True nor False: "no" would be on."""
+    """Return a switch, on or off. ModelError unless it is True or False: the string "no" would count as on."""
     if not isinstance(value, (bool, np.bool_)):
-        raise _core.ModelError(f"{what}={value!r:.80}: True or False")
+        raise _core.ModelError(f"{what}={value!r:.80}: give True or False")
     return bool(value)
 
 
 def whole(value: Any, what: str) -> int:
-    """A whole number, of any kind that counts as one; 2.0 and True are none. ModelError where it is none."""
+    """Return an integer of any integer type; 2.0 and True are refused. ModelError if it is not one."""
     try:
         if not isinstance(value, bool):
             return operator.index(value)
@@ -68,7 +68,7 @@ def whole(value: Any, what: str) -> int:
 
 
 def one_number(value: Any, what: str) -> float:
-    """A real number. ModelError where it is none."""
+    """Return a real number. ModelError if it is not one."""
     number = _core.real_array(value, what)
     if number.ndim:
         raise _core.ModelError(f"{what} takes one number, not an array {number.shape}")
@@ -88,7 +88,7 @@ def first_not_finite(given: np.ndarray, axes: int = 1) -> tuple[tuple[int, ...],
 
 
 def moment(t: Any) -> float:
-    """A time, s. EvaluationError where it is not finite."""
+    """Return a time, s. EvaluationError if it is not finite."""
     number = one_number(t, "t")
     if not np.isfinite(number):
         raise _core.EvaluationError(f"t is {number:g}; a time is a finite number of seconds")
@@ -96,7 +96,7 @@ def moment(t: Any) -> float:
 
 
 def thermal_energy(temperature: Any, boltzmann: Any, refusal: type[Exception], of: str = "", positive: bool = False) -> float:
-    """kT, J. `refusal` for what is negative or not finite, or zero where it is to be positive. `of` what it belongs to, for errors."""
+    """Return kT, J. Raises `refusal` unless kT is finite and not negative, or positive if `positive`. `of`: the owner, for errors."""
     numbers = {name: one_number(x, f"{of}{name}") for name, x in (("temperature", temperature), ("boltzmann", boltzmann))}
     for name, x in numbers.items():
         if not 0 <= x < np.inf or (positive and x == 0):
@@ -109,31 +109,31 @@ def thermal_energy(temperature: Any, boltzmann: Any, refusal: type[Exception], o
 
 
 def chosen(name: Any, what: str) -> str:
-    """One of the names that an option has; the core knows which. EvaluationError where it is no text."""
+    """Return the name given for an option; the core checks that it exists. EvaluationError if it is not a string."""
     if not isinstance(name, str):
-        raise _core.EvaluationError(f"{what}={name!r:.80}: a name")
+        raise _core.EvaluationError(f"{what}={name!r:.80}: give a name")
     return name
 
 
 def clipped(value: Any, what: str) -> int:
-    """A whole number, the nearest one that the core's integers hold: it says what is wrong with one that is too large."""
+    """Return an integer, clipped to the range of the core's integers: the core reports one that is too large."""
     return max(-LARGEST, min(whole(value, what), LARGEST))
 
 
 def name_of(name: Any, what: str, otherwise: str) -> str:
-    """A name, or another one where it is None."""
+    """Return a name, or `otherwise` if it is None."""
     return otherwise if name is None else text(name, what)
 
 
 def seed_of(seed: Any) -> np.random.Generator:
-    """The random numbers of a seed, or of a generator given. ModelError where it is neither."""
+    """Return the random generator of a seed, or the generator given. ModelError if it is neither."""
     if not isinstance(seed, np.random.Generator) and whole(seed, "seed") < 0:
         raise _core.ModelError(f"seed: a whole number from 0 on, or a numpy.random.Generator, not {seed!r}")
     return np.random.default_rng(seed)
 
 
 def parents_of(parents: Any, what: str) -> list[int]:
-    """For each body the number of its parent, smaller than its own, -1 for the base. `what` they belong to, for errors."""
+    """Return the number of each body's parent, smaller than the body's own, -1 for the base. `what`: the owner, for errors."""
     if isinstance(parents, np.ndarray) and parents.ndim != 1:
         raise _core.ModelError(f"parents of {what}: a list of whole numbers, not an array {parents.shape}")
     inboard = [whole(p, f"parents of {what}") for p in listed(parents, f"parents of {what}")]
@@ -144,7 +144,7 @@ def parents_of(parents: Any, what: str) -> list[int]:
 
 
 def pose_parts(what: str, rotation: Any, position: Any, placement: Any) -> tuple[Any, Any]:
-    """Rotation and position of a pose given as these two, None for none, or as a (4, 4) matrix. `what` it belongs to, for errors."""
+    """Return rotation and position of a pose, given as these two (None if absent) or as a (4, 4) matrix. `what`: the owner, for errors."""
     if placement is None:
         return rotation, position
     if rotation is not None or position is not None:
@@ -158,7 +158,7 @@ def pose_parts(what: str, rotation: Any, position: Any, placement: Any) -> tuple
 
 
 def limit_pair(what: str, limits: Any) -> tuple[Any, Any]:
-    """Lower and upper limits of a pair, None for none. `what` they belong to, for errors."""
+    """Return the lower and upper limits of a pair, None if absent. `what`: the owner, for errors."""
     if limits is None:
         return None, None
     try:
@@ -173,7 +173,7 @@ def _refuse(self: Any, *_: Any, **__: Any) -> Any:
 
 
 class FixedList(list[Any]):
-    """A list that stays as it is."""
+    """A list that cannot be changed."""
 
     def __init__(self, items: Iterable[Any]):
         super().__init__(map(fixed, items))
@@ -185,7 +185,7 @@ class FixedList(list[Any]):
 
 
 class FixedMapping(dict[Any, Any]):
-    """A mapping that stays as it is."""
+    """A mapping that cannot be changed."""
 
     def __init__(self, items: Mapping[Any, Any]):
         super().__init__({key: fixed(value) for key, value in items.items()})
@@ -197,9 +197,10 @@ class FixedMapping(dict[Any, Any]):
 
 
 def fixed(value: Any) -> Any:
-    """A copy of what a user gave that nobody can change: read-only arrays, and lists, mappings and sets that stay as they are.
+    """Return an immutable copy of a user's value: read-only arrays, and lists, mappings and sets that cannot be changed.
 
-    A piecewise polynomial of SciPy's is copied with its arrays; anything else is itself, as is a read-only array with numbers of its own.
+    A piecewise polynomial of SciPy is copied with its arrays; any other value is returned as it is, and so is a read-only array that owns
+    its data.
     """
     if type(value) is np.ndarray and value.base is None and not value.flags.writeable:
         return value
@@ -223,13 +224,13 @@ def fixed(value: Any) -> Any:
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """The array itself, which can no longer be written."""
+    """Return the array itself, made read-only."""
     array.setflags(write=False)
     return array
 
 
 class Fixed:
-    """A frozen dataclass that copies what it is given, and gives out what nobody can change."""
+    """A frozen dataclass that copies the values it is given and returns immutable ones."""
 
     def __post_init__(self) -> None:
         self.__setstate__(dict(vars(self)))

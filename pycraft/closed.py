@@ -1,4 +1,4 @@
-"""Objects that take no attributes but their own: a misspelt one is an error, not a number that nothing reads."""
+"""Objects that accept only their own attributes: a misspelt one is an error, not a value that nothing reads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class UnknownAttributeError(_core.ModelError, AttributeError):
 
 
 class Closed:
-    """Set are properties that can be, and what begins with an underscore; a user's own subclass may have more."""
+    """Only settable properties and names that begin with an underscore can be set; a user's own subclass may add attributes."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         kind = type(self)
@@ -25,7 +25,7 @@ class Closed:
 
 
 def settable(kind: type, name: str) -> bool:
-    """Whether objects of a kind have a value of this name that can be set."""
+    """Check that objects of a class have a value of this name that can be set."""
     found = getattr(kind, name, None)
     return isinstance(found, property) and found.fset is not None or name in getattr(kind, "__dataclass_fields__", ())
 
@@ -37,6 +37,6 @@ def _called(thing: Any) -> str:
 
 def _remedy(kind: type, name: str, known: list[str]) -> str:
     if hasattr(kind, name):
-        return ", which is read or called only" + (f"; set are {', '.join(known)}" if known else "")
+        return ", which cannot be set" + (f"; settable: {', '.join(known)}" if known else "")
     near = get_close_matches(name.lower(), known, 1) or get_close_matches(name.lower(), [n for n in dir(kind) if not n.startswith("_")], 1)
-    return f"; did you mean {near[0]!r}?" if near else f"; set are {', '.join(known)}" if known else "; nothing of it is set"
+    return f"; did you mean {near[0]!r}?" if near else f"; settable: {', '.join(known)}" if known else "; none of its attributes can be set"

@@ -1,4 +1,4 @@
-"""What the core and the lower rooms call back for, attached here and nowhere else: none of them imports what stands above it.
+"""Functions that the core and lower layers call back, attached here and nowhere else: no lower layer imports a higher one.
 
 `_core._face` holds functions by name.
 """
@@ -38,7 +38,7 @@ LATER = {
     "view_model": ("viewer.view", "view_model"),
     "view_scene": ("viewer.view", "view_scene"),
 }
-"""Name: (module, its function or class). What takes long to import is imported when it is called."""
+"""Name: (module, its function or class). Modules that take long to import are imported on the first call."""
 
 
 def _later(module: str, name: str) -> Callable[..., Any]:
@@ -46,7 +46,7 @@ def _later(module: str, name: str) -> Callable[..., Any]:
 
 
 def attach() -> None:
-    """Puts the functions where the core and the lower rooms find them."""
+    """Put the functions where the core and the lower layers find them."""
     _core._face.update(
         block_view=block_view,
         describe=describe,

@@ -1,4 +1,4 @@
-"""Paths that something long is to be written to: looked at before it begins, not after it."""
+"""Output paths of long computations, checked before the work begins."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from . import _core
 
 
 def writable_target(path: Any, endings: tuple[str, ...], what: str) -> Path:
-    """The path. EvaluationError for an ending that is none of these, OSError where it cannot be written; a file there stays as it is."""
+    """Return the path. EvaluationError unless it has one of these endings, OSError if it cannot be written; an existing file is not
+    touched."""
     try:
         target = Path(path)
     except TypeError:

@@ -1,4 +1,4 @@
-"""What syntax trees of formulas are made of, those of statements (`identities.formula`) and those of recursions (`algorithm.formulas`)."""
+"""Nodes of syntax trees of formulas, in statements (`identities.formula`) and in recursions (`algorithm.formulas`)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Suffixed(Node):
-    """What a suffix makes of one formula."""
+    """A formula with a suffix."""
 
     inner: Node
 
@@ -38,12 +38,12 @@ class Product(Node):
 
 
 def flat(factors: Iterable[Node]) -> list[Node]:
-    """Factors with those of products among them in their place."""
+    """Return the factors, with nested products expanded in place."""
     return [f for factor in factors for f in (factor.factors if isinstance(factor, Product) else (factor,))]
 
 
 def parts(node: Node) -> Iterator[Node]:
-    """The node and all under it."""
+    """Yield the node and all nodes under it."""
     yield node
     for child in node.children:
         yield from parts(child)

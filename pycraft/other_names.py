@@ -11,20 +11,20 @@ from pathlib import Path
 PACKAGES = ("Pinocchio", "MuJoCo", "Drake", "roboticstoolbox", "Simbody")
 
 OWNERS = {"pycraft": "", "Multibody": "model.", "Scene": "scene.", "Run": "run."}
-"""The classes that have a thing, and how a call of it begins."""
+"""The classes that own a thing, and how a call of it begins."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One thing and its names: here, in each of `PACKAGES` (several separated by commas), and words that users try.
+    """One thing and its names: here, in each of `PACKAGES` (several separated by commas), and other words that users try.
 
     Attributes
     ----------
     what : the thing
-    here : what it is called here, as a call
+    here : its name here, as a call
     of : the class that has it: "Multibody", "Scene", "Run" or "pycraft"
     names : the names in PACKAGES, in their order; "" where there is none
-    words : further names that are asked for, and belong to no package
+    words : further names that users look for and that belong to no package
     """
 
     what: str
@@ -35,13 +35,13 @@ class Row:
 
     @property
     def call(self) -> str:
-        """The call as a user writes it: each of several names with its owner."""
+        """Return the call as a user writes it: each of several names with its owner."""
         if "(" in self.here.partition(",")[0] or not OWNERS[self.of]:
             return OWNERS[self.of] + self.here
         return ", ".join(OWNERS[self.of] + each for each in self.here.split(", "))
 
     def asked(self) -> Iterator[str]:
-        """The identifiers under which someone may look for it: the last part of each dotted name."""
+        """Yield the identifiers under which users may look for it: the last part of each dotted name."""
         for text in (*self.names, self.words):
             for name in text.split(","):
                 if last := name.strip().rpartition(".")[2].partition("(")[0]:
@@ -58,7 +58,7 @@ def _read() -> tuple[Row, ...]:
 
 @lru_cache(maxsize=1)
 def rows() -> tuple[Row, ...]:
-    """Return the table of other_names.csv. Read once, when it is first asked for."""
+    """Return the table of other_names.csv. Read once, on first use."""
     return _read()
 
 
@@ -74,7 +74,7 @@ def _by_name() -> dict[tuple[str, str], Row]:
 def remedy(of: str, name: str) -> str:
     """Return "; here that is ..." for a name of another package or of the trade, and "" for any other.
 
-    of : the class on which it is read, as `Row.of`; what is read on the module may belong to any
+    of : the class on which it is read, as `Row.of`; a name read on the module may belong to any class
     """
     kinds = OWNERS if of == "pycraft" else {of: ""}
     row = next((found for kind in kinds if (found := _by_name().get((kind, name)))), None)
@@ -82,11 +82,11 @@ def remedy(of: str, name: str) -> str:
 
 
 class Renamed:
-    """A class whose missing attributes are answered with what they are called here."""
+    """A class that answers a missing attribute with its name here."""
 
     _of = ""
 
     def __getattr__(self, name: str) -> object:
-        """AttributeError that gives the name here. Called for names that are not there, and for no others."""
+        """Raise an AttributeError that gives the name here. Called only for missing names."""
         text = f"{type(self).__name__!r} object has no attribute {name!r}"
         raise AttributeError(text if name.startswith("_") else text + remedy(self._of, name), name=name, obj=self)

@@ -1,4 +1,4 @@
-"""How far something has come that takes long, in a terminal or a notebook."""
+"""Progress of long computations, in a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from types import TracebackType
 from typing import Any
 
 SECONDS = 1.0
-"""What takes no longer shows nothing."""
+"""Seconds; shorter work shows nothing."""
 WIDEST = 40
-"""Letters of a step's name."""
+"""Characters shown of a step's name."""
 
 
 class ProgressBar:
-    """A bar with what is done, the rate and the time left, of what takes longer than a second.
+    """A progress bar with the work done, the rate and the time left, for work longer than a second.
 
-    Nothing is shown where standard error is neither a terminal nor a notebook.
+    It shows nothing if standard error is neither a terminal nor a notebook.
 
     Parameters
     ----------
     total : how much there is to do
-    wanted : bool, False: nothing is shown
+    wanted : bool, False: show nothing
     """
 
     def __init__(self, total: float, wanted: bool = True):
@@ -33,7 +33,7 @@ class ProgressBar:
         return self
 
     def show(self, done: float, at: str, unit: str, before: float = 0.0) -> None:
-        """So much is done: `at` says it in words; the rate is in `unit`, of what was not done `before`."""
+        """Show the work done: `at` describes it in words; the rate is in `unit`, excluding work done `before`."""
         spent = monotonic() - self._began
         if self._bar is None and self._wanted and spent > SECONDS:
             self._open()
@@ -62,13 +62,13 @@ class ProgressBar:
 
 
 class StepProgress(ProgressBar):
-    """Of named steps, such as theorems or meshes: call it with the name of each before it begins.
+    """Progress of named steps, such as theorems or meshes: call it with the name of each before it begins.
 
     Parameters
     ----------
     total : how many steps there are
-    unit : what they are, "theorems"
-    progress : True or None: the bar; False: nothing; a function: it is called with each name instead
+    unit : their name, such as "theorems"
+    progress : True or None: show the bar; False: show nothing; a function: call it with each name instead
     """
 
     def __init__(self, total: int, unit: str, progress: Callable[[str], None] | bool | None = True):
@@ -77,7 +77,7 @@ class StepProgress(ProgressBar):
         self._unit, self._done = unit, 0
 
     def __call__(self, name: str) -> None:
-        """This step begins; those before it are done."""
+        """Report that this step begins; the steps before it are done."""
         if self._call is not None:
             self._call(name)
         self.show(self._done, f"{self._done} of {self._total} {self._unit}: {name[:WIDEST]}", f"{self._unit}/s")
@@ -85,7 +85,7 @@ class StepProgress(ProgressBar):
 
 
 class _NotebookLine:
-    """A line of text in a notebook's cell, which is replaced as the work goes on and is empty when it ends."""
+    """A line of text in a notebook's cell, replaced as the work goes on and empty when it ends."""
 
     def __init__(self, total: float):
         from IPython.display import display
@@ -102,12 +102,12 @@ class _NotebookLine:
 
 
 class RunProgress(ProgressBar):
-    """Of a run, by its time."""
+    """Progress of a run, by its time."""
 
     def __init__(self, start: float, end: float, wanted: bool = True):
         super().__init__(end - start, wanted)
         self._start, self._end = start, end
 
     def __call__(self, t: float) -> None:
-        """The run is at t."""
+        """Report that the run is at t."""
         self.show(t - self._start, f"{t:.4g} of {self._end:.4g} s", "s/s")

@@ -1,4 +1,4 @@
-"""States: q and v of one model, and how random ones are drawn."""
+"""States: q and v of one model, and random states."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .closed import Closed
 class State(Closed):
     """Generalized coordinates `q` (nq,) and velocities `v` (nv,) of a model.
 
-    Anything that takes q takes a State, and then its v with it.
+    Every argument q accepts a State, and then uses its v as well.
     """
 
     q: np.ndarray
@@ -24,10 +24,10 @@ class State(Closed):
 
 
 def at_state(model: Any, q: Any = None, v: Any = None) -> tuple[Any, Any]:
-    """The q and v that a call means, by the one rule of direct calls and of `Operator.at`.
+    """Return the q and v of a call, by the one rule of direct calls and of `Operator.at`.
 
-    Without q the model's present state, v with it unless it is given; of a State its q, and its v unless one is given; beside an array q
-    zero velocities where v is left out.
+    Without q: the model's present state, with its v unless v is given. With a State: its q, and its v unless v is given. With an array q:
+    zero velocities unless v is given.
     """
     if q is None:
         return model.q, model.v if v is None else getattr(v, "v", v)
@@ -37,7 +37,7 @@ def at_state(model: Any, q: Any = None, v: Any = None) -> tuple[Any, Any]:
 
 
 def moment_of(q: Any, t: Any, states: Any) -> tuple[Any, Any]:
-    """The t and the effects' own states that a call means where they are left out: a run's, else 0 and None, as they are at first."""
+    """Return the t and the effects' own states of a call. Defaults: those of a run, else 0 and None, their initial values."""
     of_run = getattr(q, "states", np.zeros(0))
     if states is None and of_run.shape[-1]:
         states = of_run
@@ -45,7 +45,7 @@ def moment_of(q: Any, t: Any, states: Any) -> tuple[Any, Any]:
 
 
 def names_of_q(model: Any) -> list[str]:
-    """Of the numbers of q: those of hinges, numbered where these have several."""
+    """Return the names of the entries of q: names of hinges, numbered for hinges with several entries."""
     names: list[str] = []
     for name, hinge in model.hinges.items():
         count = hinge.q_slice.stop - hinge.q_slice.start
@@ -54,7 +54,7 @@ def names_of_q(model: Any) -> list[str]:
 
 
 def random_state(model: _core.Multibody, seed: int | np.random.Generator = 0) -> State:
-    """A random state of `model`, the same for the same seed.
+    """Return a random state of `model`, the same for the same seed.
 
     One-coordinate subhinges: uniform within the limits, else ±π for angles and ±1 m for travels. Ball and free: rotations uniform on
     the group (a normalised Gaussian quaternion), positions in ±1 m. Velocities uniform in ±1.
@@ -82,7 +82,7 @@ def random_state(model: _core.Multibody, seed: int | np.random.Generator = 0) ->
 
 
 def _interval(span: float, lower: float, upper: float) -> tuple[float, float]:
-    """What of ±span lies within the limits; where nothing does, the part of them nearest to zero, as wide as they and ±span allow."""
+    """Return the part of ±span within the limits; if empty, the part of the limits nearest to zero, as wide as they and ±span allow."""
     low, high = max(-span, lower), min(span, upper)
     if low <= high:
         return low, high

@@ -1,4 +1,4 @@
-"""Tidy tables: a list of rows with named columns, and the ways out of it."""
+"""Tidy tables: lists of rows with named columns, and their exports."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from rich.cells import cell_len
 
 
 class TidyTable:
-    """Rows as dictionaries with the same keys, one measurement each. Iterates over rows; `len`, indexing.
+    """Rows as dictionaries with the same keys, one measurement each. Supports iteration over rows, `len` and indexing.
 
-    Ways out: `to_pandas()`, `to_csv(path)`, `to_json(path)`, `table()` for a terminal; shown as a table in a notebook.
+    Exports: `to_pandas()`, `to_csv(path)`, `to_json(path)`, `table()` for a terminal; a notebook shows a table.
     """
 
     columns: ClassVar[tuple[str, ...]] = ()
     shown: ClassVar[dict[str, str]] = {}
     """Columns of the displayed table: key and heading."""
     short: ClassVar[dict[str, str]] = {}
-    """Headings where a terminal is narrow."""
+    """Headings used in narrow terminals."""
     legend: ClassVar[dict[str, str]] = {}
-    """Signs for the last column where a terminal is narrow, see `marks`."""
+    """Signs for the last column in narrow terminals; see `marks`."""
     measure: ClassVar[str] = "error"
-    """The column that says "refused" where a terminal is narrow."""
+    """The column that shows "refused" in narrow terminals."""
     common: ClassVar[str] = ""
-    """The column whose value stands in a line of its own above the rows that share it, where a terminal is narrow."""
+    """The column shown as a line of its own above the rows with the same value, in narrow terminals."""
 
     def __init__(self, title: str, rows: list[dict[str, Any]], about: dict[str, Any] | None = None):
         self.title, self.rows, self.about = title, rows, dict(about or {})
@@ -46,14 +46,14 @@ class TidyTable:
         return self.rows[index]
 
     def part(self, rows: list[dict[str, Any]]) -> Any:
-        """The same table with some of its rows."""
+        """Return the same table with some of its rows."""
         other = copy.copy(self)
         other.rows = list(rows)
         return other
 
-    # ------------------------------------------------------------------ ways out
+    # ------------------------------------------------------------------ export
     def to_pandas(self) -> Any:
-        """The rows as a pandas data frame. Needs pandas."""
+        """Return the rows as a pandas data frame. Needs pandas."""
         try:
             import pandas
         except ImportError:
@@ -61,14 +61,15 @@ class TidyTable:
         return pandas.DataFrame(self.rows, columns=list(self.columns))
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the rows as CSV, one column a key; what was not measured stays empty."""
+        """Write the rows as CSV, one column per key; missing measurements stay empty."""
         with open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, self.columns)
             writer.writeheader()
             writer.writerows(self.rows)
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """The title, what was measured and the rows as JSON text, written to `path` where one is given. What is not finite is null."""
+        """Return the title, the conditions of the measurement and the rows as JSON text, and write it to `path` if given. Values that are
+        not finite are null."""
         rows = [{key: None if isinstance(x, float) and not math.isfinite(x) else x for key, x in row.items()} for row in self.rows]
         text = json.dumps({"title": self.title, **self.about, "rows": rows}, indent=1, ensure_ascii=False)
         if path is not None:
@@ -77,21 +78,21 @@ class TidyTable:
 
     # ------------------------------------------------------------------ display
     def cell(self, key: str, row: dict[str, Any]) -> str:
-        """The text of one cell of the displayed table."""
+        """Return the text of one cell of the displayed table."""
         value = row[key]
         return "" if value is None else str(value)
 
     def style(self, row: dict[str, Any]) -> str:
-        """The style of a row in a terminal."""
+        """Return the style of a row in a terminal."""
         return ""
 
     def label(self, row: dict[str, Any]) -> str:
-        """What a row is called."""
+        """Return the name of a row."""
         return self.cell(next(iter(self.shown)), row)
 
     @property
     def refusals(self) -> dict[str, list[str]]:
-        """Each reason of a refusal, in full, with the names of the rows that it refuses."""
+        """Return each reason of a refusal, in full, with the names of the refused rows."""
         found: dict[str, list[str]] = {}
         for row in self.rows:
             if row.get("refused"):
@@ -99,19 +100,19 @@ class TidyTable:
         return found
 
     def marks(self, row: dict[str, Any]) -> str:
-        """Signs of `legend` for what the last column of the table says in words, where a terminal is too narrow for these."""
+        """Return signs of `legend` that stand for the words of the last column, for terminals too narrow for the words."""
         return ""
 
     @property
     def note(self) -> str:
-        """A sentence below the displayed table."""
+        """Return a sentence shown below the table."""
         return ""
 
     def table(self, width: int | None = None) -> Any:
-        """The rows as a rich table for a terminal of this width (the present one's where left out): no number and no word is cut.
+        """Return the rows as a rich table for a terminal of this width (default: the present one): numbers and words are never cut.
 
-        Where the whole does not fit: shorter headings, signs with a legend for the last column, a line for what rows have in common,
-        and names folded between words.
+        If the table does not fit: shorter headings, signs with a legend for the last column, a line for values that rows share, and names
+        folded between words.
         """
         from rich.markup import escape as plain
         from rich.table import Table
@@ -180,17 +181,17 @@ class TidyTable:
 
 
 def terminal_width() -> int:
-    """Of the terminal, or COLUMNS; 140 where there is neither."""
+    """Return the width of the terminal, or COLUMNS, or 140."""
     return get_terminal_size((140, 24)).columns
 
 
 def _widths(headings: Iterable[str], cells: list[list[str]]) -> list[int]:
-    """Of columns that hold their headings and texts in one line each."""
+    """Return the widths of columns that hold their headings and texts in one line each."""
     return [max(map(cell_len, texts)) for texts in zip(headings, *cells, strict=True)]
 
 
 def seconds_text(seconds: float | None) -> str:
-    """A time with its unit: 0.45 µs, 12 ms."""
+    """Return a time with its unit: 0.45 µs, 12 ms."""
     if seconds is None:
         return ""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
@@ -200,23 +201,23 @@ def seconds_text(seconds: float | None) -> str:
 
 
 def refusal_text(reason: str, width: int = 48) -> str:
-    """Why a row has no numbers, cut to a width; the row itself has the whole text."""
+    """Return the reason why a row has no values, cut to a width; the row itself has the whole text."""
     text = f"refused: {reason}" if reason else ""
     return text if len(text) <= width else text[: width - 1].rstrip() + "…"
 
 
 def error_text(error: float | None) -> str:
-    """An error in two figures."""
+    """Return an error in two figures."""
     return "" if error is None else f"{error:.1e}"
 
 
 def share_text(share: float | None) -> str:
-    """A share in two figures: 0.35 %, 47 %."""
+    """Return a share in two figures: 0.35 %, 47 %."""
     return "" if share is None else f"{100 * share:.2g} %" if abs(share) < 0.0995 else f"{100 * share:.0f} %"
 
 
 def bytes_text(count: int | None) -> str:
-    """A size with its unit: 640 B, 5.3 kB."""
+    """Return a size with its unit: 640 B, 5.3 kB."""
     if count is None:
         return ""
     return f"{count} B" if count < 1000 else f"{count / 1000:.1f} kB"

@@ -120,7 +120,7 @@ IntegrationCost run_motion(const Motion& m, double* q, double* v) {
   Samples<S> samples(q, v, mb.nq(), mb.nv());
   if (!m.stiff.is_none())
     samples.examine = [&](const S& t, const std::vector<S>& x, const S& step, const S& last) {
-      const std::optional<Stiffness> found = stiffness_at(scene, t, x, step, last);
+      const std::optional<Stiffness> found = stiffness_at(scene, m.options.integrator, t, x, step, last);
       if (!found) return false;
       const py::gil_scoped_acquire gil;
       m.stiff(as_dict(*found));

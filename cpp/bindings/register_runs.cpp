@@ -109,7 +109,7 @@ void run_in(CompiledScene<S>& scene, const std::vector<double>& q, const std::ve
     x = SceneEquations<S>(scene, works).initial(S(asked.times.front()), wq.data(), wv.data(), own.empty() ? nullptr : y.data());
   }
   Recorder<S> recorder(record, SceneEquations<S>::unit_of_work(), asked.progress,
-                       [&scene](const S& t, const std::vector<S>& x, const S& step, const S& last) { return stiffness_at(scene, t, x, step, last); }, asked.stiff);
+                       [&scene, &asked](const S& t, const std::vector<S>& x, const S& step, const S& last) { return stiffness_at(scene, asked.options.integrator, t, x, step, last); }, asked.stiff);
   RunEnd<S> end;
   const RunPlan<S> plan{asked.times, asked.end_at_times, asked.events.functions<S>(), asked.checkpoint ? &resumed : nullptr};
   const auto start = std::chrono::steady_clock::now();
@@ -176,6 +176,56 @@ std::string alone(SceneCalls& calls, const std::string& integrator) {
   return why;
 }
 
+// States of a run as numbers of its equations; holding: of which row what controllers hold is.
+template <class S>
+std::vector<S> state_of_row(const CompiledScene<S>& scene, const Rows& rows, const RunRecord& record, int i, int holding) {
+  std::vector<S> x;
+  const auto append = [&](const std::vector<double>& all, int width, const S& unit) {
+    for (int j = 0; j < width; ++j) x.push_back(S(all[size_t(i) * width + j]) / unit);
+  };
+  append(rows.q, record.nq, S(1)), append(rows.v, record.nv, S(1)), append(rows.own, record.own, S(1)), append(rows.work, record.works, SceneEquations<S>::unit_of_work());
+  for (const auto& e : scene.effects().effects())
+    for (size_t j = e->declared.states.size(); j < static_cast<size_t>(e->declared.own()); ++j)
+      x[record.nq + record.nv + e->first + j] = S(rows.own[size_t(holding) * record.own + e->first + j]);
+  return x;
+}
+
+// Accelerations at both ends of each step between rows, by what acts in it: at a knot and where a controller is sampled those before and after differ.
+template <class S>
+void accelerations_of_steps(CompiledScene<S>& scene, const Rows& rows, const RunRecord& record, std::vector<double>& after, std::vector<double>& before) {
+  SceneEquations<S> equations(scene, false);
+  std::vector<S> vdot(record.nv), rate(record.own);
+  const auto find = [&](int i, int holding, std::vector<double>& to) {
+    const std::vector<S> x = state_of_row(scene, rows, record, i, holding);
+    equations.evaluate(S(rows.t[i]), x.data(), x.data() + record.nq, x.data() + record.nq + record.nv, vdot.data(), rate.data());
+    for (int j = 0; j < record.nv; ++j) to[size_t(i) * record.nv + j] = to_double(vdot[j]);
+  };
+  const int last = static_cast<int>(rows.t.size()) - 1;
+  for (int k = 0; k < last; ++k) {
+    equations.between(S(rows.t[k]), S(rows.t[k + 1]));
+    find(k, k + 1, after), find(k + 1, k + 1, before);
+  }
+  std::copy_n(after.begin(), record.nv, before.begin());
+  std::copy(before.end() - record.nv, before.end(), after.end() - record.nv);
+}
+
+py::tuple step_accelerations(SceneCalls& calls, const Array& t, const Array& q, const Array& v, const Array& own) {
+  const Multibody& mb = calls.scene().model();
+  const auto numbers = [](const Array& a) { return std::vector<double>(a.data(), a.data() + a.size()); };
+  const Rows rows{numbers(t), numbers(q), numbers(v), numbers(own), {}};
+  RunRecord record;
+  record.nq = mb.nq(), record.nv = mb.nv();
+  std::vector<double> after(rows.t.size() * record.nv), before(after.size());
+  if (rows.t.size() > 1) {
+    const Undisturbed undisturbed(mb);
+    calls.with([&]<class S>(CompiledScene<S>& scene) {
+      record.own = scene.effects().own();
+      accelerations_of_steps(scene, rows, record, after, before);
+    });
+  }
+  return py::make_tuple(as_rows(after, rows.t.size(), record.nv), as_rows(before, rows.t.size(), record.nv));
+}
+
 // The states at `times`, each within the step between rows at[i] and at[i] + 1: by the integrator's dense output, or by Hermite's.
 template <class S>
 void between_in(CompiledScene<S>& scene, const IntegratorOptions* options, const Rows& rows, const std::vector<double>& times, const std::vector<int>& at, RunRecord& record) {
@@ -187,17 +237,6 @@ void between_in(CompiledScene<S>& scene, const IntegratorOptions* options, const
     pair.equations = std::make_unique<SceneEquations<S>>(scene, works);
   HermiteOutput<S> hermite(*pair.equations, options && record_of(options->integrator).order == 1);
   Recorder<S> recorder(record, SceneEquations<S>::unit_of_work(), nullptr);
-  const auto row = [&](int i, int holding) {  // holding: of which row what is held is
-    std::vector<S> x;
-    const auto append = [&](const std::vector<double>& all, int width, int i, const S& unit) {
-      for (int j = 0; j < width; ++j) x.push_back(S(all[size_t(i) * width + j]) / unit);
-    };
-    append(rows.q, record.nq, i, S(1)), append(rows.v, record.nv, i, S(1)), append(rows.own, record.own, i, S(1)), append(rows.work, record.works, i, SceneEquations<S>::unit_of_work());
-    for (const auto& e : scene.effects().effects())
-      for (size_t j = e->declared.states.size(); j < static_cast<size_t>(e->declared.own()); ++j)
-        x[record.nq + record.nv + e->first + j] = S(rows.own[size_t(holding) * record.own + e->first + j]);
-    return x;
-  };
   std::vector<S> x0, x1, x;
   bool own_output = false;
   for (size_t i = 0; i < times.size(); ++i) {
@@ -205,7 +244,7 @@ void between_in(CompiledScene<S>& scene, const IntegratorOptions* options, const
     const int k = at[i];
     const S t(times[i]), t0(rows.t[k]), t1(rows.t[k + 1]);
     if (i == 0 || at[i - 1] != k) {
-      x0 = row(k, k + 1), x1 = row(k + 1, k + 1);
+      x0 = state_of_row(scene, rows, record, k, k + 1), x1 = state_of_row(scene, rows, record, k + 1, k + 1);
       pair.equations->between(t0, t1);
       own_output = pair.stepper && pair.stepper->again(t0, x0, t1);
       if (!own_output) hermite.set(t0, x0, t1, x1);
@@ -244,26 +283,26 @@ py::dict between(SceneCalls& calls, const std::string& integrator, const Array& 
 // Accelerations at the ends of steps that are known already.
 class KnownAccelerations : public ExplicitEquations<double> {
  public:
-  KnownAccelerations(const CompiledModel<double>& model, const double* t, const double* vdot) : ExplicitEquations<double>(model, 0), t_(t), vdot_(vdot) {}
+  KnownAccelerations(const CompiledModel<double>& model, const double* t, const double* after, const double* before) : ExplicitEquations<double>(model, 0), t_(t), after_(after), before_(before) {}
   void look_at(int step) { step_ = step; }
   void evaluate(const double& t, const double* q, const double* v, const double*, double* vdot, double*) override {
     at_q_ = q, at_v_ = v;
-    std::copy_n(vdot_ + size_t(t == t_[step_] ? step_ : step_ + 1) * nv(), nv(), vdot);
+    std::copy_n(t == t_[step_] ? after_ + size_t(step_) * nv() : before_ + size_t(step_ + 1) * nv(), nv(), vdot);
   }
 
  private:
-  const double *t_, *vdot_;
+  const double *t_, *after_, *before_;  // by row: those with which a step begins there, and ends
   int step_ = 0;
 };
 
 // q (K, nq) and v (K, nv) at `times`, each between rows at[i] and at[i] + 1.
-py::tuple hermite_between(const Multibody& mb, const Array& t, const Array& q, const Array& v, const Array& vdot, const std::vector<double>& times, const std::vector<int>& at) {
+py::tuple hermite_between(const Multibody& mb, const Array& t, const Array& q, const Array& v, const Array& after, const Array& before, const std::vector<double>& times, const std::vector<int>& at) {
   const int nq = mb.nq(), nv = mb.nv();
   std::vector<double> all_q, all_v, x0, x1, x;
   {
     const Undisturbed undisturbed(mb);
     const auto numbers = mb.compiled<double>();
-    KnownAccelerations equations(*numbers, t.data(), vdot.data());
+    KnownAccelerations equations(*numbers, t.data(), after.data(), before.data());
     HermiteOutput<double> hermite(equations, false);
     const auto row = [&](int i, std::vector<double>& x) {
       x.assign(q.data() + size_t(i) * nq, q.data() + size_t(i + 1) * nq);
@@ -347,9 +386,20 @@ void register_runs(py::module_& m) {
       check_pairing(calls.scene(), calls.precision(), integrator_from_name(integrator));
   }, py::arg("calls"), py::arg("integrator"), py::arg("foreign"), py::arg("implicit"), "EvaluationError where they do not fit each other.");
   m.def("scene_between", &between, py::arg("calls"), py::arg("integrator"), py::arg("t"), py::arg("q"), py::arg("v"), py::arg("states"), py::arg("work"), py::arg("times"), py::arg("at"));
-  m.def("hermite_between", [](const std::shared_ptr<Multibody>& model, const Array& t, const Array& q, const Array& v, const Array& vdot, const std::vector<double>& times, const std::vector<int>& at) {
-    return hermite_between(*model, t, q, v, vdot, times, at);
-  }, py::arg("model"), py::arg("t"), py::arg("q"), py::arg("v"), py::arg("vdot"), py::arg("times"), py::arg("at"));
+  m.def("hermite_between", [](const std::shared_ptr<Multibody>& model, const Array& t, const Array& q, const Array& v, const Array& after, const Array& before, const std::vector<double>& times,
+                             const std::vector<int>& at) { return hermite_between(*model, t, q, v, after, before, times, at); },
+        py::arg("model"), py::arg("t"), py::arg("q"), py::arg("v"), py::arg("after"), py::arg("before"), py::arg("times"), py::arg("at"));
+  m.def("step_accelerations", &step_accelerations, py::arg("calls"), py::arg("t"), py::arg("q"), py::arg("v"), py::arg("states"),
+        "Accelerations (K, nv) with which steps begin and end at the rows of a run, by what acts in each.");
+  m.def("held_states", [](SceneCalls& calls) {
+    std::vector<int> held;
+    const ModelInUse use(calls.scene().model());
+    calls.with([&]<class S>(CompiledScene<S>& scene) {
+      for (const auto& e : scene.effects().effects())
+        for (int j = static_cast<int>(e->declared.states.size()); j < e->declared.own(); ++j) held.push_back(e->first + j);
+    });
+    return held;
+  }, py::arg("calls"), "Which of the effects' own states controllers hold from one sample to the next.");
   m.def("integrator_table", &table, "What the core's integrators are.");
 }
 

@@ -39,7 +39,7 @@ struct RunRecord {
   IntegrationCost cost;
   long linearizations = 0, solutions = 0, in_packs = 0;
   double seconds = 0;
-  std::optional<Stiffness> stiffness;              // where stability holds the steps of an explicit method
+  std::optional<Stiffness> stiffness;              // where stability holds the steps of an explicit method, or those of one size are unstable
   std::vector<std::pair<double, int>> switches;    // RunEnd's
   std::vector<PassRecord> passes;
   WrittenCheckpoint checkpoint;
@@ -68,7 +68,7 @@ Checkpoint<S> read(const WrittenCheckpoint& w) {
 
 inline py::dict as_dict(const Stiffness& s) {
   py::dict d;
-  d["t"] = s.t, d["step"] = s.step, d["rate"] = s.rate, d["left"] = s.left, d["effect"] = s.effect, d["coordinate"] = s.coordinate;
+  d["t"] = s.t, d["step"] = s.step, d["rate"] = s.rate, d["left"] = s.left, d["effect"] = s.effect, d["coordinate"] = s.coordinate, d["longest"] = s.longest;
   return d;
 }
 

@@ -1,4 +1,4 @@
-"""Makes the site: `python -m making build/docs`; its first page is build/docs/html/index.html."""
+"""Build the site: `python -m making build/docs`; its first page is build/docs/html/index.html."""
 
 import subprocess
 import sys
@@ -11,14 +11,14 @@ FORWARD = '<!doctype html><meta charset="utf-8"><title>PyCraft</title><meta http
 
 
 def written(path: Path, text: str) -> None:
-    """Written where it is another text: Sphinx reads again what is newer."""
+    """Write a text unless the file has it already: Sphinx reads newer files again."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
 
 
 def assembled(folder: Path) -> dict[str, str]:
-    """The sources of the site in one folder; returns the text of the pages that were generated."""
+    """Write the sources of the site into one folder; return the text of the generated pages."""
     texts = {folder / path.relative_to(contents.ROOT): path.read_text(encoding="utf-8") for path in contents.committed()}
     made = generated.pages()
     texts |= {folder / f"{page}.md": text for page, text in made.items()}
@@ -26,7 +26,7 @@ def assembled(folder: Path) -> dict[str, str]:
         written(path, text)
     for copy in folder.rglob("*"):
         if copy.suffix in (".md", ".ipynb") and copy not in texts:
-            copy.unlink()  # a page that is no more
+            copy.unlink()  # a page that no longer exists
     generated.pictures(folder)
     return made
 
@@ -52,5 +52,5 @@ def main(folder: Path) -> int:
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
-        sys.exit("python -m making FOLDER: the site is made in FOLDER/html")
+        sys.exit("usage: python -m making FOLDER; the site is written to FOLDER/html")
     sys.exit(main(Path(sys.argv[1]).resolve()))

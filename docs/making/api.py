@@ -1,4 +1,4 @@
-"""The reference of all public names, with their types, from the names themselves."""
+"""The reference of all public names, with their types, generated from the package."""
 
 import inspect
 from types import ModuleType
@@ -10,12 +10,12 @@ from .groups import MULTIBODY, PYCRAFT, grouped
 
 
 def public() -> dict[str, Any]:
-    """What `import pycraft as pc` promises, by name."""
+    """Return the public objects of `import pycraft as pc` by name."""
     return {name: getattr(pc, name) for name in pc.__all__}
 
 
 def first_sentence(thing: Any) -> str:
-    """Of its docstring, as a cell of a table; a signature that stands first is passed over."""
+    """Return the first sentence of a docstring as a cell of a table; a leading signature is skipped."""
     lines = [line.strip() for line in (inspect.getdoc(thing) or "").splitlines() if line.strip()]
     lines = lines[1:] if lines and "->" in lines[0] and "(" in lines[0] else lines
     sentence = " ".join(lines).split(". ")[0].rstrip(".") if lines else ""
@@ -23,7 +23,7 @@ def first_sentence(thing: Any) -> str:
 
 
 def of_groups(name: str, kind: type, groups: dict[str, str]) -> dict[str, str]:
-    """The page of a class with a table of its members by heading, and a page for each heading."""
+    """Return the page of a class with a table of its members by heading, and a page for each heading."""
     by_heading = grouped(groups, [member for member in dir(kind) if not member.startswith("_")])
     place = {heading: f"{name}_{heading.lower().replace(' ', '_')}" for heading in by_heading}
     rows, made = [], {}
@@ -61,7 +61,7 @@ def of_module(name: str, module: ModuleType) -> str:
 
 
 def pages() -> dict[str, str]:
-    """A page for every class and module, one for all functions, one for all errors; the list of them first."""
+    """Return a page for every class and module, one for all functions and one for all errors; the index comes first."""
     names = public()
     errors = {n: t for n, t in names.items() if inspect.isclass(t) and issubclass(t, Exception)}
     classes = {n: t for n, t in names.items() if inspect.isclass(t) and n not in errors}
@@ -70,16 +70,16 @@ def pages() -> dict[str, str]:
     made = {f"docs/api/{n}": of_class(n, t) for n, t in classes.items() if n != "Multibody"}
     made |= {f"docs/api/{n}_module": of_module(n, t) for n, t in modules.items()}
     listed = "\n\n".join(f"```{{eval-rst}}\n.. autofunction:: pycraft.{n}\n```" for n in functions)
-    made["docs/api/functions"] = f"# Functions\n\nWhat `pycraft` has beside its classes.\n\n{listed}\n"
+    made["docs/api/functions"] = f"# Functions\n\nFunctions of `pycraft`.\n\n{listed}\n"
     listed = "\n\n".join(f"```{{eval-rst}}\n.. autoexception:: pycraft.{n}\n   :show-inheritance:\n```" for n in errors)
-    made["docs/api/errors"] = f"# Errors and warnings\n\nWhat `pycraft` raises.\n\n{listed}\n"
+    made["docs/api/errors"] = f"# Errors and warnings\n\nErrors that `pycraft` raises, and its warnings.\n\n{listed}\n"
     place = (
         {n: n for n in classes} | {n: f"{n}_module" for n in modules} | {n: "functions" for n in functions} | {n: "errors" for n in errors}
     )
     tables = []
     for heading, group in grouped(PYCRAFT, list(names)).items():
         rows = [f"| [`{n}`]({place[n]}.md) | {first_sentence(names[n])} |" for n in group]
-        tables.append("\n".join([f"## {heading}\n", "| name | what it is |", "|---|---|", *rows]))
+        tables.append("\n".join([f"## {heading}\n", "| name | description |", "|---|---|", *rows]))
     table = "\n\n".join(tables)
     tree = "```{toctree}\n:hidden:\n\nMultibody\n" + "\n".join(page.removeprefix("docs/api/") for page in made) + "\n```"
     made |= of_groups("Multibody", pc.Multibody, MULTIBODY)

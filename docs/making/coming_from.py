@@ -1,4 +1,4 @@
-"""The table of docs/coming_from.md: `PYTHONPATH=docs python -m making.coming_from` writes it anew from pycraft/other_names.csv."""
+"""The table of docs/coming_from.md: `PYTHONPATH=docs python -m making.coming_from` writes it again from pycraft/other_names.csv."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ def _code(names: str) -> str:
 
 
 def table() -> str:
-    """Return the rows as Markdown: the thing, its name here, and its names in each package."""
+    """Return the rows as Markdown: the subject, its name here, and its names in each package."""
     lines = ["| | here | " + " | ".join(PACKAGES) + " |", "|---|---|" + "---|" * len(PACKAGES)]
     lines += [f"| {row.what} | `{row.call}` | " + " | ".join(_code(names) for names in row.names) + " |" for row in rows()]
     return "\n".join(lines)

@@ -1,8 +1,8 @@
-"""The site: `make docs`. What it is made of is assembled by `docs/making` first, committed pages and generated ones in one folder."""
+"""Sphinx configuration of the site (`make docs`). `docs/making` first collects committed and generated pages in one folder."""
 
 from pathlib import Path
 
-import mathjax  # django-static-mathjax: MathJax as files, so that pages ask nobody for it
+import mathjax  # django-static-mathjax: MathJax as files, so that pages need no network
 
 project = "PyCraft"
 author = "the PyCraft authors"
@@ -11,7 +11,7 @@ html_title = "PyCraft"
 root_doc = "docs/index"
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx_design", "making.docstrings"]
-suppress_warnings = ["ref.python"]  # a type in a docstring is words, of which some are names of two classes' members
+suppress_warnings = ["ref.python"]  # types in docstrings are prose, and some words are members of two classes
 
 # ---- pages
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "attrs_inline"]
@@ -23,7 +23,7 @@ nb_execution_raise_on_error = True
 nb_ipywidgets_js = {}
 nb_merge_streams = True
 
-# ---- docstrings: plain text with the star of the adjoint; `docs/making/docstrings.py` says what is markup in them
+# ---- docstrings: plain text with the star of the adjoint; `docs/making/docstrings.py` defines their markup
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 python_maximum_signature_line_length = 90
@@ -40,7 +40,7 @@ html_show_sourcelink = False
 html_static_path = ["../static", str(Path(mathjax.__file__).parent / "static/mathjax/es5/tex-svg-full.js")]
 html_favicon = "../static/favicon.svg"
 html_css_files = ["pycraft.css"]
-html_js_files = [("search_in_files.js", {"priority": 200})]  # before Sphinx's own search asks for pages
+html_js_files = [("search_in_files.js", {"priority": 200})]  # before Sphinx's own search requests pages
 mathjax_path = "tex-svg-full.js"
 mathjax3_config = {"svg": {"fontCache": "global", "scale": 0.95}, "tex": {"tags": "none"}}
 pygments_style = "friendly"

@@ -7,12 +7,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 INDEX = ROOT / "docs" / "index.md"
-# What follows from the code is written when the site is made; docs/index.md names it beside what is committed.
+# Pages generated with the site; docs/index.md lists them beside the committed ones.
 GENERATED = ("docs/operators/index", "docs/theorems/index", "docs/api/index", "docs/gallery/index")
 
 
 def listed() -> list[str]:
-    """The pages that docs/index.md lists, in order, as paths from the root without their suffix."""
+    """Return the pages that docs/index.md lists, in order, as paths from the root without their suffix."""
     pages = [INDEX.relative_to(ROOT).with_suffix("").as_posix()]
     for options, entries in re.findall(r"```\{toctree\}\n((?::[^\n]*\n)*)(.*?)```", INDEX.read_text(encoding="utf-8"), re.S):
         for entry in entries.split():
@@ -26,23 +26,23 @@ def listed() -> list[str]:
 
 
 def committed() -> list[Path]:
-    """The files of the pages that are in the repository."""
+    """Return the files of the committed pages."""
     return [source(page) for page in listed() if page not in GENERATED]
 
 
 def source(page: str) -> Path:
-    """The file of a page that is in the repository."""
+    """Return the file of a committed page."""
     for suffix in (".md", ".ipynb"):
         path = (ROOT / page).with_suffix(suffix)
         if path.is_file():
             return path
     raise FileNotFoundError(
-        f"docs/index.md lists {page}, and there is no {page}.md and no {page}.ipynb: write it, or take it from the list"
+        f"docs/index.md lists {page}, but neither {page}.md nor {page}.ipynb exists: write the page, or remove it from the list"
     )
 
 
 def text(path: Path) -> str:
-    """The Markdown of a page, without its blocks of code."""
+    """Return the Markdown of a page, without its blocks of code."""
     written = path.read_text(encoding="utf-8")
     if path.suffix == ".ipynb":
         cells = json.loads(written)["cells"]
@@ -51,20 +51,20 @@ def text(path: Path) -> str:
 
 
 def anchors(path: Path) -> set[str]:
-    """What a link may name behind its #: the headings, as GitHub and MyST spell them."""
+    """Return the anchors of a page: its headings, as GitHub and MyST spell them."""
     headings = re.findall(r"^#+ +(.*?)#* *$", text(path), re.M)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def links(path: Path) -> Iterator[str]:
-    """The targets of a page's links and pictures that lie in the repository."""
+    """Yield the targets in the repository of a page's links and pictures."""
     for target in re.findall(r"(?<!\\)\]\(([^)\s]+)\)", re.sub(r"`[^`\n]*`", "", text(path))):
         if not re.match(r"\w+:", target):
             yield target
 
 
 def dead_links(path: Path) -> list[str]:
-    """Of these, those that lead nowhere in the repository: pages that are generated are reached by docs/index.md alone."""
+    """Return the link targets that do not exist in the repository; only docs/index.md may link to generated pages."""
     dead = []
     for target in links(path):
         file, _, anchor = target.partition("#")

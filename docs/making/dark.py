@@ -1,15 +1,15 @@
-"""Figures for dark pages: grounds, texts, axes and dark lines change places with light ones; colours that mean something stay."""
+"""Figures for dark pages: backgrounds, texts, axes and dark lines are exchanged with light ones; meaningful colours are kept."""
 
 from typing import Any
 
 import numpy as np
 
 GROUND, INK = "#131416", "#cfd0d0"
-"""The page's own in dark mode."""
+"""Colours of the page in dark mode."""
 
 
 def darken(figure: Any) -> None:
-    """Change a Matplotlib figure in place for a dark ground: greys are turned about, and colours too dark to be seen are lightened."""
+    """Adapt a Matplotlib figure in place to a dark background: invert greys, and lighten colours that are too dark."""
     import matplotlib.collections
     import matplotlib.patches
     from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ def darken(figure: Any) -> None:
 
 
 def turned(color: Any) -> Any:
-    """A colour for a dark ground: a grey's lightness is turned about, a dark colour is mixed with the ink; others stay."""
+    """Return a colour for a dark background: greys are inverted, dark colours are mixed with the ink, others are kept."""
     from matplotlib.colors import to_rgba
 
     if isinstance(color, str) and color == "none":

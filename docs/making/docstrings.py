@@ -1,22 +1,22 @@
-"""Docstrings are written to be read as they stand: stars are adjoints and bars are norms, not markup. Sphinx is told so."""
+"""Conversion of docstrings for Sphinx: in plain text stars are adjoints and bars are norms, not markup."""
 
 import re
 from typing import Any
 
-# What reStructuredText would read as markup in plain text: emphasis, substitutions, footnotes and references.
+# Plain text that reStructuredText would read as markup: emphasis, substitutions, footnotes and references.
 MARKUP = re.compile(r"\\|\*|\||(?<=\w)_(?!\w)|\[(?=\d+\]_)")
 LISTS = ("Parameters", "Other Parameters", "Attributes", "Returns", "Yields", "Raises", "Warns")
 LITERAL = re.compile(r"(``.*?``|`[^`]*`)")
 
 
 def escaped(line: str) -> str:
-    """A line of prose with its stars, bars and final underscores as they stand; what is in backquotes is code."""
+    """Escape the stars, bars and final underscores of a line of prose; text in backquotes is code."""
     parts = LITERAL.split(line)
     return "".join(part if number % 2 else MARKUP.sub(r"\\\g<0>", part) for number, part in enumerate(parts))
 
 
 def with_notes(lines: list[str]) -> list[str]:
-    """A docstring whose paragraphs after a list of parameters, returns or errors are notes, and not read as more of these."""
+    """Move paragraphs after a list of parameters, returns or errors into notes, so that they are not read as further items."""
     made: list[str] = []
     listing = False
     for number, line in enumerate(lines):
@@ -37,7 +37,7 @@ def _indent(line: str) -> int:
 
 
 def as_markup(lines: list[str]) -> list[str]:
-    """A docstring as reStructuredText: examples and indented displays are kept as they are."""
+    """Convert a docstring to reStructuredText; examples and indented displays are kept."""
     lines = with_notes(lines)
     made: list[str] = []
     example = False
@@ -67,7 +67,7 @@ def as_markup(lines: list[str]) -> list[str]:
 
 
 def _opens_display(lines: list[str], number: int) -> bool:
-    """A line of prose before a blank one and a block that is set in: formulas, as on paper."""
+    """Check for a line of prose before a blank line and an indented block: displayed formulas."""
     line, rest = lines[number], lines[number + 1 :]
     if not line.strip() or len(rest) < 2 or rest[0].strip():
         return False

@@ -1,4 +1,4 @@
-"""The gallery: every script of docs/gallery with the figure that it draws and the page that it leaves, made when the site is."""
+"""The gallery: every script of docs/gallery with its figure and its page, drawn when the site is built."""
 
 import ast
 import warnings
@@ -14,23 +14,23 @@ SCRIPTS = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 
 
 def said(script: Path) -> str:
-    """The sentence that a script begins with."""
+    """Return the first sentence of a script."""
     return ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
 
 
 def plays(script: Path) -> bool:
-    """Whether a script leaves a page that plays: what it calls `page`."""
+    """Check that a script leaves an animated page, in a variable `page`."""
     tree = ast.parse(script.read_text(encoding="utf-8"))
     return any(isinstance(node, ast.Name) and node.id == "page" and isinstance(node.ctx, ast.Store) for node in ast.walk(tree))
 
 
 def title(script: Path) -> str:
-    """The title of an example, from the name of its script."""
+    """Return the title of an example, from the name of its script."""
     return script.stem.replace("_", " ").capitalize()
 
 
 def draw(script: Path, picture: Path) -> None:
-    """Run a script and save the last figure that it left, for light pages and, beside it, for dark ones; and its page, if it leaves one.
+    """Run a script and save its last figure, for light and for dark pages, and its animated page, if it has one.
 
     ValueError for a script that leaves no figure.
     """
@@ -45,7 +45,7 @@ def draw(script: Path, picture: Path) -> None:
         warnings.simplefilter("ignore", ModelWarning)
         exec(compile(script.read_text(encoding="utf-8"), str(script), "exec"), left)
     if not plt.get_fignums():
-        raise ValueError(f"{script.name} leaves no figure: every example of the gallery draws one")
+        raise ValueError(f"{script.name} leaves no figure: every example of the gallery must draw one")
     picture.parent.mkdir(parents=True, exist_ok=True)
     if plays(script):
         left["page"].save(picture.with_suffix(".html"))
@@ -56,7 +56,7 @@ def draw(script: Path, picture: Path) -> None:
 
 
 def pages() -> dict[str, str]:
-    """The gallery as thumbnails, and a page for each example; pictures are named as the scripts are."""
+    """Return the gallery as thumbnails, and a page for each example; pictures have the names of the scripts."""
     cards = []
     for script in SCRIPTS:
         cards.append(
@@ -67,12 +67,12 @@ def pages() -> dict[str, str]:
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(script.stem for script in SCRIPTS) + "\n```"
     grid = "::::{grid} 1 2 3 3\n:gutter: 3\n\n" + "\n\n".join(cards) + "\n::::"
     playing = ", ".join(f"[{title(script)}]({script.stem}.md)" for script in SCRIPTS if plays(script))
-    first = f"# Gallery\n\n{len(SCRIPTS)} short, complete examples, each with the figure that it draws. These also play: {playing}."
+    first = f"# Gallery\n\n{len(SCRIPTS)} short, complete examples, each with its figure. These are animated: {playing}."
     return {"docs/gallery/index": f"{first}\n\n{grid}\n\n{tree}\n"} | {f"docs/gallery/{script.stem}": example(script) for script in SCRIPTS}
 
 
 def example(script: Path) -> str:
-    """The page of one example: what it shows, its figure, the page that plays, its code."""
+    """Return the page of one example: its description, its animation, its figure, its code."""
     code = script.read_text(encoding="utf-8").partition('"""\n\n')[2].strip()
     parts = [f"# {title(script)}", said(script)]
     if plays(script):

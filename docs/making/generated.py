@@ -1,4 +1,4 @@
-"""The pages that follow from the code, all of them."""
+"""All pages generated from the code."""
 
 import shutil
 from pathlib import Path
@@ -8,7 +8,7 @@ from .contents import ROOT
 
 
 def pages() -> dict[str, str]:
-    """Each page's text by its place, from the root and without its suffix."""
+    """Return each page's text by its path from the root, without its suffix."""
     made: dict[str, str] = {}
     for source in (operators, theorems, api, gallery):
         made |= source.pages()
@@ -16,14 +16,14 @@ def pages() -> dict[str, str]:
 
 
 def pictures(folder: Path) -> None:
-    """The pictures of all pages: those that are committed, and those of the gallery, drawn into the folder that they are in."""
+    """Copy the committed pictures, and draw the pictures of the gallery, into the folder of the site's sources."""
     (folder / "docs" / "static").mkdir(parents=True, exist_ok=True)
-    for picture in sorted((ROOT / "docs" / "static").glob("*.png")):
+    for picture in sorted(path for path in (ROOT / "docs" / "static").iterdir() if path.suffix in (".png", ".svg")):
         shutil.copyfile(picture, folder / "docs" / "static" / picture.name)
     for script in gallery.SCRIPTS:
         gallery.draw(script, folder / "docs" / "gallery" / f"{script.stem}.png")
 
 
 def playing(folder: Path) -> list[Path]:
-    """The pages that were made beside them, which Sphinx does not copy: a frame shows each."""
+    """Return the animated pages of the gallery, which Sphinx does not copy: each is shown in a frame."""
     return [folder / "docs" / "gallery" / f"{script.stem}.html" for script in gallery.SCRIPTS if gallery.plays(script)]

@@ -1,4 +1,4 @@
-"""Public names in groups, for the pages of the reference: what a newcomer scans by what he wants to do."""
+"""Public names in groups by task, for the pages of the reference."""
 
 MULTIBODY = {
     "Build": (
@@ -38,14 +38,14 @@ MULTIBODY = {
     "Parts": "subgraph whole carrier moving_base follow_base path state_of q_of v_of q_index v_index accelerations_of",
     "Files and pictures": "save tree plot view shapes collision_shapes",
 }
-"""Of `Multibody`, by heading."""
+"""Members of `Multibody`, by heading."""
 
 PYCRAFT = {
     "Models": "Multibody load robots chain tree sko_model models State Spline",
     "Operators": ("Operator OperatorSet Scalar Space vector constant identity zero blockdiag euclidean parse symbolic from_sympy to_sympy"),
     "Statements and proofs": "check truth prove prove_derivative derivative repair hypothesis_switches Proof exercise Exercise worksheet",
     "Scenes and runs": "Scene effects mechanisms load_scene load_run Event Checkpoint loops_compared",
-    "Many runs": "sweep samples load_sweep",
+    "Ensembles": "sweep samples load_sweep",
     "Accuracy and comparison": "accuracy work_precision compare",
     "Estimation": "kalman",
     "Other packages and C++": "interop cmake_dir instruction_set",
@@ -54,13 +54,13 @@ PYCRAFT = {
         "RefinementError UndecidedError ModelWarning"
     ),
 }
-"""Of `pycraft`, by heading."""
+"""Names of `pycraft`, by heading."""
 
 
 def grouped(groups: dict[str, str], names: list[str]) -> dict[str, list[str]]:
-    """Return the names by heading. ValueError for a name in no group, in two, or in one and not there."""
+    """Return the names by heading. Raise ValueError for a name in no group, in two groups, or in a group but not in the list."""
     made = {heading: listed.split() for heading, listed in groups.items()}
     listed = [name for group in made.values() for name in group]
     if wrong := (set(listed) ^ set(names)) | {name for name in listed if listed.count(name) > 1}:
-        raise ValueError(f"docs/making/groups.py: {', '.join(sorted(wrong))} must be in one group, and be there")
+        raise ValueError(f"docs/making/groups.py: {', '.join(sorted(wrong))} must be in one group, and exist")
     return made

@@ -1,7 +1,7 @@
 """The picture at the head of the README: `PYTHONPATH=docs python -m making.landing` writes docs/static/landing.png.
 
-A formula, the robot that it is asked of, the blocks of its factor, and the recursion that it stands for. The ground is light by itself, so
-that it reads on a dark page too.
+The picture has a formula, a robot, the blocks of a factor, and the recursion. Its background is light, so
+that it is also readable on a dark page.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ GROUND, INK = "#f6f8fa", "#1f2328"
 
 
 def draw(path: Path) -> None:
-    """Draws it into a file."""
+    """Draw the picture into a file."""
     import matplotlib
 
     matplotlib.use("Agg")

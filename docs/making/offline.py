@@ -1,11 +1,11 @@
-"""What a built page would ask the network for: nothing, or the site is not made."""
+"""Requests that a built page would send to the network; the build fails if there are any."""
 
 import re
 from html.parser import HTMLParser
 from pathlib import Path
 
 ELSEWHERE = re.compile(r"^\s*(?:https?:)?//", re.I)
-# What a browser fetches by itself: an <a href> is followed by its reader alone, and asks nobody.
+# Attributes that a browser fetches by itself; an <a href> is followed only by its reader.
 FETCHED = {"src", "srcset", "data", "poster"}
 IN_STYLE = re.compile(r"(?:url\(\s*['\"]?|@import\s+['\"])\s*((?:https?:)?//[^'\")]+)", re.I)
 
@@ -33,14 +33,14 @@ class _Fetched(HTMLParser):
 
 
 def asked_of_others(page: str) -> list[str]:
-    """What a browser would fetch from elsewhere for this page of HTML."""
+    """Return the external resources that a browser would fetch for this page of HTML."""
     parser = _Fetched()
     parser.feed(page)
     return parser.found
 
 
 def not_offline(site: Path) -> list[str]:
-    """Of all pages and style sheets of a site: what each would fetch, with its file."""
+    """Return the external resources of all pages and style sheets of a site, each with its file."""
     found = [(path, what) for path in sorted(site.rglob("*.html")) for what in asked_of_others(path.read_text(encoding="utf-8"))]
     found += [(path, what) for path in sorted(site.rglob("*.css")) for what in IN_STYLE.findall(path.read_text(encoding="utf-8"))]
     return [f"{path.relative_to(site)}: {what}" for path, what in found]

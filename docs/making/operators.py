@@ -1,4 +1,4 @@
-"""A page for every letter of the symbol table, on one small model: what it is, its derivative, its recursion, its cost, its blocks."""
+"""A page for every letter of the symbol table, on one small model: its meaning, derivative, recursion, cost and blocks."""
 
 import re
 from functools import lru_cache
@@ -15,7 +15,7 @@ COORDINATE = "hinge1[0]"
 
 @lru_cache(maxsize=1)
 def example() -> Any:
-    """Five bodies, a branch, hinges of one, two and three coordinates, rotors, a node, moving in a field of gravity."""
+    """Return the example: five bodies, a branch, hinges of one, two and three coordinates, rotors, a node, in motion under gravity."""
     model = pc.tree([-1, 0, 1, 1, 0], ["pin", "universal", "slider", "ball", "pin"], seed=0, rotor_inertia=True)
     model.add_node("tool", "body3", position=(0.3, 0, 0))
     model.gravity = (0, 0, -9.81)
@@ -25,41 +25,41 @@ def example() -> Any:
 
 
 def letter(symbol: Any) -> Any:
-    """The letter on the example, called with what it takes."""
+    """Return the letter on the example, called with its arguments."""
     made = getattr(example().soa, symbol.name)
     return {"nothing": lambda: made, "nodes": lambda: made(["tool"]), "coordinate": lambda: made(COORDINATE)}[symbol.takes]()
 
 
 def typed(symbol: Any) -> str:
-    """As a user types it."""
+    """Return the letter as a user types it."""
     return {"nothing": "soa.{}", "nodes": 'soa.{}(["tool"])', "coordinate": 'soa.{}("' + COORDINATE + '")'}[symbol.takes].format(
         symbol.name
     )
 
 
 def tokens(statement: str) -> set[str]:
-    """The letters of a line such as "M = P − E_ψ P E_φ*"."""
+    """Return the letters of a line such as "M = P − E_ψ P E_φ*"."""
     return {re.sub(r"[*()⁻¹ᵀ]+$", "", word.lstrip("(")) for word in statement.split()}
 
 
 def plain(text: str) -> str:
-    """Text whose stars are adjoints, whose bars are norms and whose brackets are brackets, as Markdown."""
+    """Escape text for Markdown: stars are adjoints, bars are norms, and brackets are brackets."""
     return re.sub(r"[*|_\[\]<]", r"\\\g<0>", text)
 
 
 def folded(text: str) -> str:
-    """A formula in lines; rows after the first are set in."""
+    """Wrap a formula; lines after the first are indented."""
     return "\n".join(wrap(text, WIDTH, subsequent_indent="    ", break_long_words=False))
 
 
 def formula(expression: Any, name: str) -> str:
-    """A display where it is short, text else: a display does not wrap."""
+    """Return a display if the formula is short, otherwise text, because a display does not wrap."""
     text = expression.text()
     return f"$$\n{name} = {expression.latex()}\n$$" if len(text) < 90 else f"```text\n{folded(text)}\n```"
 
 
 def in_theorems(symbol: Any) -> list[tuple[int, Any]]:
-    """Theorems of the catalogue with the letter on either side, by their number."""
+    """Return the theorems of the catalogue with the letter on either side, with their numbers."""
 
     def letters(node: Any) -> set[str]:
         return {node.letter.name if node.letter is not None else ""}.union(*map(letters, node.children))
@@ -88,7 +88,7 @@ def page(symbol: Any) -> str:
         parts += ["An abbreviation:", formula(made.definition, name)]
     assumed = [line for line in [*AXIOMS, *DEFINITIONS] if symbol.text in tokens(line)]
     if assumed:
-        parts += ["What [proofs](../proofs.md) assume of it:", "```text\n" + "\n".join(assumed) + "\n```"]
+        parts += ["[Proofs](../proofs.md) assume of it:", "```text\n" + "\n".join(assumed) + "\n```"]
     moved = made.diff(COORDINATE)
     parts += ["## Derivative", f"Along a coordinate i of another hinge, here {COORDINATE} ([sensitivities](../sensitivities.md)):"]
     parts += [formula(moved, rf"\partial_i {name}")]
@@ -108,10 +108,10 @@ def page(symbol: Any) -> str:
 
 
 def pages() -> dict[str, str]:
-    """The pages by their names, the list of them first."""
+    """Return the pages by their names, the index first."""
     made = {f"docs/operators/{symbol.name}": page(symbol) for symbol in _core.symbols}
     rows = [f"| [{plain(s.text)}]({s.name}.md) | `{s.name}` | {s.domain} → {s.codomain} | {plain(s.meaning)} |" for s in _core.symbols]
-    table = "\n".join(["| letter | in Python | maps | what it is |", "|---|---|---|---|", *rows])
+    table = "\n".join(["| letter | in Python | maps | meaning |", "|---|---|---|---|", *rows])
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(s.name for s in _core.symbols) + "\n```"
-    text = "Every letter of the algebra, from the symbol table; each page has its derivative, its recursion, its cost and its blocks."
+    text = "Every letter of the algebra, from the symbol table; each page has the letter's derivative, recursion, cost and blocks."
     return {"docs/operators/index": f"# The operators\n\n{text}\n\n{table}\n\n{tree}\n", **made}

@@ -7,11 +7,11 @@ import pycraft as pc
 
 from .operators import example, plain
 
-USES = {"check": "", "rewrite": "a rule of simplification", "inverse": "the planner inverts by it"}
+USES = {"check": "", "rewrite": "a rule of simplification", "inverse": "a rule by which the planner inverts"}
 
 
 def source(said: str) -> str:
-    """Where a theorem is from, as the catalogue says it in short."""
+    """Return the source of a theorem, from the short form in the catalogue."""
     if said == "Jain 2011":
         return "Source: A. Jain, *Robot and Multibody Dynamics*, Springer 2011"
     if said == "general J":
@@ -20,7 +20,7 @@ def source(said: str) -> str:
 
 
 def entry(number: int, theorem: Any) -> str:
-    """One theorem: its formula, where it holds, and why."""
+    """Return the entry of one theorem: its formula, its hypotheses, and its proof."""
     where = [*theorem.hypotheses, *(["between bodies on one path from the root"] if theorem.on_one_path else [])]
     said = [f"Holds where {', '.join(where)}" if where else "No hypothesis"]
     said += [USES[theorem.use]] if USES.get(theorem.use) else []
@@ -29,12 +29,12 @@ def entry(number: int, theorem: Any) -> str:
     if proof:
         parts += [f"<details><summary>Proof</summary>\n\n```text\n{str(proof).strip()}\n```\n\n</details>"]
     else:
-        parts += ["`pc.prove` finds no proof of this one from the definitions; `soa.check()` checks it with numbers."]
+        parts += ["`pc.prove` finds no proof of this theorem from the definitions; `soa.check()` checks it numerically."]
     return "\n\n".join(parts)
 
 
 def pages() -> dict[str, str]:
-    """A page for each group, and the list of all theorems first."""
+    """Return a page for each group, with the list of all theorems first."""
     theorems = list(enumerate(example().soa.theorems()))
     made, listed = {}, []
     for group in dict.fromkeys(theorem.group for _, theorem in theorems):
@@ -52,7 +52,7 @@ def pages() -> dict[str, str]:
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.rpartition("/")[2] for page in made) + "\n```"
     first = [
         "# The theorems",
-        f"The {len(theorems)} theorems of the catalogue, as the planner and `arm.soa.check()` have them. Each has its hypotheses and, "
-        "where `pc.prove` finds one, its proof from the definitions ([proofs](../proofs.md)).",
+        f"The {len(theorems)} theorems of the catalogue, as used by the planner and `arm.soa.check()`. Each has its hypotheses and, "
+        "if `pc.prove` finds one, its proof from the definitions ([proofs](../proofs.md)).",
     ]
     return {"docs/theorems/index": "\n\n".join([*first, *listed, tree]) + "\n", **made}

@@ -1,6 +1,6 @@
-"""The pictures of the three tours: `PYTHONPATH=docs python -m making.tours` writes docs/static/tour_researcher.png and its fellows.
+"""The pictures of the three tours: `PYTHONPATH=docs python -m making.tours` writes docs/static/tour_researcher.png and the others.
 
-Their ground is light, so that they read on a dark page.
+Their background is light, so that they are readable on a dark page.
 """
 
 from pathlib import Path
@@ -17,7 +17,7 @@ SIZE = (3.4, 2.0)
 
 
 def researcher(figure: Any) -> None:
-    """The blocks that a conjecture forgets, on a tree with two branches."""
+    """Draw the blocks that a conjecture omits, on a tree with two branches."""
     tree = pc.tree([-1, 0, 1, 2, 0, 4, 5], ["pin"] * 7, seed=1)
     tree.q = tree.random_state(seed=1).q
     O, U, psi_tilde = tree.soa("Omega Upsilon psi_tilde")
@@ -35,7 +35,7 @@ def researcher(figure: Any) -> None:
 
 
 def teacher(figure: Any) -> None:
-    """The factorization of the mass matrix, block by block."""
+    """Draw the factorization of the mass matrix, block by block."""
     arm = pc.chain(6, seed=3)
     arm.q = arm.random_state(seed=0).q
     H, phi, M, D, K, I = arm.soa("H phi M D K I")
@@ -53,7 +53,7 @@ def teacher(figure: Any) -> None:
 
 
 def engineer(figure: Any) -> None:
-    """A robot that a servo takes to a posture, and its coordinates over time."""
+    """Draw a robot that a servo moves to a posture, and its coordinates over time."""
     arm = pc.robots.panda()
     target = [0.3, -0.4, 0.2, -1.8, 0.1, 1.6, 0.5]
     scene = pc.Scene(arm).add(pc.effects.Gravity(), pc.effects.Servo(target=target))
@@ -74,7 +74,7 @@ def engineer(figure: Any) -> None:
 
 
 def draw(made: Any, path: Path) -> None:
-    """Draw one of them into a file."""
+    """Draw one picture into a file."""
     import matplotlib
 
     matplotlib.use("Agg")

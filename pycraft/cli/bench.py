@@ -1,7 +1,7 @@
-"""`pycraft bench`: the bounds on speed, measured; each result is checked in the same run that times it. Figures are ratios of one run.
+"""`pycraft bench`: measure the bounds on speed; each result is checked in the same run that times it. Figures are ratios within one run.
 
-What a ratio compares is timed in turn, several times, and the least of the medians counts: a machine's speed changes from one second to the
-next, and what else runs on it only adds.
+The calls of a ratio are timed in turn, several times, and the least of the medians counts: a machine's speed changes from one second to the
+next, and other programs only add time.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SHORT, LONG = 100, 1000
 
 @dataclass
 class Figure:
-    """One measured figure: value, unit, and the bound it is held to (None where there is none)."""
+    """One measured figure: value, unit, and its bound (None without one)."""
 
     name: str
     value: float
@@ -36,7 +36,7 @@ class Figure:
 
 
 def operators_of(arm: Any) -> dict[str, _core.Operator]:
-    """What is timed: every operator, ℳ, its inverse, and one inverse that no theorem gives."""
+    """Return the operators to time: every operator, ℳ, its inverse, and one inverse that no theorem gives."""
     soa = arm.soa
     names = "E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega".split()
     chosen = {name: getattr(soa, name) for name in names}
@@ -48,7 +48,7 @@ def operators_of(arm: Any) -> dict[str, _core.Operator]:
 
 
 def _checked(name: str, operator: _core.Operator, x: np.ndarray) -> None:
-    """The rules change the cost, never the result: what was planned against what was typed."""
+    """Check that the rules change the cost and not the result: the planned evaluation against the typed one."""
     fast = operator @ x
     literal = operator.at(precision="quad")
     exact = literal @ x
@@ -58,17 +58,17 @@ def _checked(name: str, operator: _core.Operator, x: np.ndarray) -> None:
 
 
 Timed: TypeAlias = Callable[[float], Mapping[str, float]]
-"""Times something for so many seconds."""
+"""Times a call for that many seconds."""
 
 
 def in_turn(seconds: float, *timed: Timed, rounds: int = 5) -> list[float]:
-    """The time of each, in seconds a call: one after the other for several rounds, the least median of each."""
+    """Return the time of each, in seconds per call: one after the other for several rounds, the least median of each."""
     medians = [[each(seconds / rounds)["median"] for each in timed] for _ in range(rounds)]
     return [min(of_one) for of_one in zip(*medians, strict=True)]
 
 
 def per_link(seconds: float = 0.1) -> list[Figure]:
-    """Time per link for chains of 1000 links over that for 100, of every operator and of ℳ⁻¹x: O(N) means about one."""
+    """Return the time per link for chains of 1000 links over 100, of every operator and of ℳ⁻¹x: O(N) means about one."""
     rng = np.random.default_rng(0)
     arms, timed = [chain(n, seed=1) for n in (SHORT, LONG)], dict[str, list[Timed]]()
     for arm in arms:
@@ -88,7 +88,7 @@ def per_link(seconds: float = 0.1) -> list[Figure]:
 
 
 WHOLE_PACKS = 64
-"""States of a batch that is timed in packs: of several whole ones in every precision, of which the widest takes sixteen."""
+"""States of a batch timed in packs: several whole packs in every precision; the widest pack holds sixteen."""
 
 
 def _states(arm: Any, count: int = 8) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -104,7 +104,7 @@ def _elapsed(f: Any, repeats: int) -> float:
 
 
 def direct_calls(seconds: float = 0.2) -> list[Figure]:
-    """Direct calls on the shipped robots, microseconds; each checked by the other (forward of inverse dynamics)."""
+    """Time direct calls on the package's robots, microseconds; each is checked by the other (forward of inverse dynamics)."""
     from ..models import robots
 
     figures = []
@@ -122,7 +122,7 @@ def direct_calls(seconds: float = 0.2) -> list[Figure]:
 
 
 def sensitivities(seconds: float = 0.2) -> list[Figure]:
-    """What derivatives cost: sweeps of ∂ℳ x, ratios to one forward dynamics, and Pinocchio's own beside them where it is installed."""
+    """Measure the cost of derivatives: sweeps of ∂ℳ x, ratios to one forward dynamics, and Pinocchio's own if it is installed."""
     from ..models import robots
 
     figures = []
@@ -152,7 +152,7 @@ def sensitivities(seconds: float = 0.2) -> list[Figure]:
 
 
 def _beside_pinocchio(name: str, robot: Any, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> list[Figure]:
-    """Derivative calls from Python, ours over Pinocchio's; none where Pinocchio is not installed."""
+    """Time derivative calls from Python, ours over Pinocchio's; none if Pinocchio is not installed."""
     try:
         from ..interop.pinocchio import derivative_calls
 
@@ -170,7 +170,7 @@ def _beside_pinocchio(name: str, robot: Any, q: np.ndarray, v: np.ndarray, u: np
     return figures
 
 
-# What a way to compute may cost over `fast` in double (extended: 64 bits of an old coprocessor, or where that has none all of quad's).
+# Bounds on the cost of a method over `fast` in double (extended: 64 bits of an old coprocessor; without one, all of quad's).
 WAYS: dict[str, tuple[dict[str, Any], float]] = {
     "fast + 1 refinement": ({"refine": 1}, 2.2),
     "fast + 1 refinement, wide gather": ({"refine": 1, "residual": "gather"}, 2.6),
@@ -182,11 +182,11 @@ WAYS: dict[str, tuple[dict[str, Any], float]] = {
 
 
 UD_AT_WORST = 3.5
-"""`ud` over `fast` where every joint has one coordinate and little else to do, or there are more bodies than a cache holds."""
+"""`ud` over `fast` if every joint has one coordinate and little other work, or bodies exceed a cache."""
 
 
 def ud_at_worst(seconds: float) -> list[Figure]:
-    """`ud` over `fast` on sliders, stars, hinges of three subhinges and 2000 bodies."""
+    """Measure `ud` over `fast` on sliders, stars, hinges of three subhinges and 2000 bodies."""
     n = 50
     models = {
         "50 sliders": tree(range(-1, n - 1), ["slider"] * n),
@@ -202,7 +202,7 @@ def ud_at_worst(seconds: float) -> list[Figure]:
 
 
 def heavy_tips(seconds: float) -> list[Figure]:
-    """Chains of rods with a heavy tip over `fast` without one, which costs the same: no ratio makes a way dear."""
+    """Measure chains of rods with a heavy tip over `fast` without one, of the same cost: no ratio makes a method expensive."""
     figures = []
     for n in (4, 8, 20):
         even = chain(n)
@@ -221,7 +221,7 @@ def heavy_tips(seconds: float) -> list[Figure]:
 
 
 def accuracy(seconds: float = 0.2) -> list[Figure]:
-    """What accuracy costs: forward dynamics in every way over `fast` in double, and batches in packs."""
+    """Measure the cost of accuracy: forward dynamics by every method over `fast` in double, and batches in packs."""
     from ..models import robots
 
     figures = []
@@ -253,7 +253,7 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
 
 
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:
-    """All figures, by heading."""
+    """Return all figures, by heading."""
     from .bench_expressions import expressions
     from .bench_frames import frames
     from .bench_hybrid import hybrid

@@ -1,4 +1,4 @@
-"""What expressions cost (`pycraft bench`): built, planned, applied beside the kernels; batches in packs beside their states one by one.
+"""Cost of expressions (`pycraft bench`): built, planned, applied beside the kernels; batches in packs beside their states one by one.
 
 Each result is checked in the run that times it. Figures in microseconds are the least of several rounds.
 """
@@ -16,7 +16,7 @@ from ..models.generators import chain
 from .bench import Figure, _elapsed, _states, in_turn
 
 PLANNED, DERIVED, OVER_KERNEL = 100.0, 50000.0, 0.6
-"""Bounds in µs: the first evaluation of ten operators, a third derivative of Υ and its value, `e @ x` in Python beyond the core's run."""
+"""Bounds in µs: the first evaluation of ten operators, a third derivative of Υ and its value, `e @ x` in Python without the core's run."""
 OVER_DIRECT = 1.15
 """Bound of ℳ⁻¹x at new states over the direct call."""
 NEVER = 2**31 - 1
@@ -29,7 +29,7 @@ def _ten_operators(soa: Any) -> _core.Operator:
 
 
 def building(repeats: int = 2000) -> list[Figure]:
-    """An expression of ten operators in Python: typed, and evaluated for the first time; a third derivative, too."""
+    """Time an expression of ten operators in Python: typed, and evaluated for the first time; also a third derivative."""
     model = chain(7, seed=1)
     soa = model.soa
     typed = min(_elapsed(lambda: _ten_operators(soa), repeats) for _ in range(5))
@@ -55,7 +55,7 @@ def _third_derivative(soa: Any) -> np.ndarray:
 
 
 def _check_third_derivative(model: Any, step: float = 1e-4) -> None:
-    """Against a central difference of the second, which leaves step² of the fifth and eps / step of rounding."""
+    """Check against a central difference of the second, with errors of step² of the fifth and eps / step of rounding."""
     second, along, x = model.soa.Upsilon.diff(1).diff(2), step * np.eye(7)[4], np.ones(42)
     difference = (second.at(model.q + along) @ x - second.at(model.q - along) @ x) / (2 * step)
     if not np.allclose(_third_derivative(model.soa), difference, rtol=0, atol=1e-6 * np.abs(difference).max()):
@@ -63,7 +63,7 @@ def _check_third_derivative(model: Any, step: float = 1e-4) -> None:
 
 
 def _beside_kernels(name: str, model: Any, seconds: float) -> list[Figure]:
-    """ℳ⁻¹x at states in rotation over forward dynamics at rest, which is ℳ⁻¹τ; what `e @ x` takes in Python beyond the core's run."""
+    """Time ℳ⁻¹x at states in rotation over forward dynamics at rest, which is ℳ⁻¹τ; and the Python part of `e @ x`."""
     q, v, u = _states(model)
     inverse, x = model.soa.MM.inv(), u[0]
     bound = inverse.at(q, v)
@@ -100,7 +100,7 @@ def _beside_kernels(name: str, model: Any, seconds: float) -> list[Figure]:
 
 
 def _requests(model: Any) -> dict[str, Callable[[Any, Any], np.ndarray]]:
-    """What is asked of batches: sweeps, kernels, realizations, derivatives, eliminations; each typed once."""
+    """Return requests for batches: sweeps, kernels, realizations, derivatives, eliminations; each typed once."""
     soa, x, i = model.soa, np.ones(model.nv), model.nv - 1
     MM = soa.MM + soa.J
     applied = {
@@ -121,7 +121,7 @@ def _requests(model: Any) -> dict[str, Callable[[Any, Any], np.ndarray]]:
 
 
 def _seconds(ask: Callable[[Any, Any], np.ndarray], q: np.ndarray, v: np.ndarray, record_from: int) -> float:
-    """A state of a batch, in packs or one by one; the least of some calls."""
+    """Return the time per state of a batch, in packs or one by one; the least of some calls."""
     before = _core.record_from(record_from)
     try:
         ask(q, v)
@@ -131,7 +131,7 @@ def _seconds(ask: Callable[[Any, Any], np.ndarray], q: np.ndarray, v: np.ndarray
 
 
 def _in_packs(name: str, model: Any) -> list[Figure]:
-    """A batch in packs over its states one by one, and over calls for one state each."""
+    """Time a batch in packs over its states one by one, and over calls for one state each."""
     q, v, _ = _states(model, BATCH)
     few = slice(0, 64)
     figures = []
@@ -151,7 +151,7 @@ def _in_packs(name: str, model: Any) -> list[Figure]:
 
 
 def expressions(seconds: float = 0.2) -> list[Figure]:
-    """All of the above, on two robots and a chain."""
+    """Return all of these figures, on two robots and a chain."""
     from ..models import robots
 
     figures = building()

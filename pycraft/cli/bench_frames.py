@@ -1,4 +1,4 @@
-"""What frames cost (`pycraft bench`): a question the hinges between its frames, one that is asked again a look-up, none nothing."""
+"""Cost of frames (`pycraft bench`): a query costs the hinges between its frames, a repeated one a look-up, none costs nothing."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .bench import Figure
 SMALL, GREAT = 1000, 100_000
 QUESTIONS = 64
 ASKED, KEPT, NOTHING = 4.0, 2.0, 1.1
-"""Bounds. The numbers of a hinge of a great model lie in no cache: they are a few times slower to come by than those of a small one."""
+"""Bounds. The data of a hinge in a large model are in no cache: they are a few times slower to reach than in a small one."""
 
 
 def branched(size: int) -> Multibody:
-    """Two bodies on every body: depth log₂ of the size."""
+    """Return a tree with two bodies on every body: depth log₂ of the size."""
     model = Multibody(f"tree of {size}")
     for k in range(size):
         parent = f"b{(k - 1) // 2}" if k else None
@@ -28,7 +28,7 @@ def branched(size: int) -> Multibody:
 
 
 def _least(call: Callable[[int], Any], rounds: int) -> float:
-    """The least time of a call in seconds; it is told which round it is."""
+    """Return the least time of a call in seconds; its argument is the number of the round."""
     times = []
     for i in range(rounds):
         begin = time.perf_counter()
@@ -38,12 +38,12 @@ def _least(call: Callable[[int], Any], rounds: int) -> float:
 
 
 class _Asked:
-    """A model, leaves of it, and states that are set in turn."""
+    """A model, some leaves, and states that are set in turn."""
 
     def __init__(self, size: int):
         self.model, rng = branched(size), np.random.default_rng(1)
         self.states = rng.uniform(-1, 1, (4, size))
-        self.before = _least(self.set, 200)  # before there is any frame, and on the same pages of memory as after
+        self.before = _least(self.set, 200)  # before there is any frame, and on the same pages of memory as afterwards
         leaves = rng.integers(size // 2, size, QUESTIONS)
         self.frames = [self.model.frame(f"b{k}") for k in leaves]
         self.depth = float(np.mean(np.floor(np.log2(leaves + 1)) + 1))
@@ -56,7 +56,7 @@ class _Asked:
             frame.velocity()
 
     def new(self, rounds: int) -> float:
-        """Seconds a question at a state that was not asked about, without what setting it takes."""
+        """Return seconds per query at a new state, without the cost of setting it."""
         times = []
         for i in range(rounds):
             self.set(i)
@@ -70,7 +70,7 @@ class _Asked:
 
 
 def frames(seconds: float = 0.2) -> list[Figure]:
-    """Questions at new states and at known ones on 10⁵ bodies over 10³, and a state that is set and not asked about."""
+    """Time queries at new and known states on 10⁵ bodies over 10³, and setting a state without a query."""
     rounds = max(20, int(200 * seconds))
     small, great = _Asked(SMALL), _Asked(GREAT)
     for asked in (small, great):

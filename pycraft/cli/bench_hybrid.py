@@ -1,4 +1,4 @@
-"""What prescribed motion costs (`pycraft bench`): hybrid dynamics over forward dynamics, in C++, ratios of one run."""
+"""Cost of prescribed motion (`pycraft bench`): hybrid dynamics over forward dynamics, in C++, ratios within one run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .bench import Figure, _states, in_turn
 HYBRID = 1.10
 """Bound: hybrid dynamics over forward dynamics."""
 WRONG = 1e-9
-"""Relative: how far forces may be from those of inverse dynamics at the accelerations found; kernels' rounding is far below."""
+"""Relative tolerance of forces against inverse dynamics at the accelerations found; kernels' rounding is far below."""
 
 
 def _checked(name: str, model: Any, chosen: list[str], q: np.ndarray, v: np.ndarray, u: np.ndarray) -> None:
@@ -25,7 +25,7 @@ def _checked(name: str, model: Any, chosen: list[str], q: np.ndarray, v: np.ndar
 
 
 def hybrid(seconds: float = 0.2) -> list[Figure]:
-    """With the first hinge prescribed, the last, and every third, on three robots and a chain."""
+    """Measure with the first hinge prescribed, the last, and every third, on three robots and a chain."""
     from ..models import robots
 
     figures = []

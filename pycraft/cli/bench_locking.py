@@ -1,5 +1,5 @@
-"""What locked hinges and coalesced bodies cost (`pycraft bench`): edits of a great model over making it ready again, which each edit of
-the structure asks for, and what a locked model's forward dynamics takes."""
+"""Cost of locked hinges and coalesced bodies (`pycraft bench`): edits of a large model over preparing it again, which each edit of the
+structure requires, and forward dynamics of a locked model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .bench import Figure, _states, in_turn
 
 GREAT, FEW = 100_000, 10
 BOUND = 1.0
-"""An edit over the first forward dynamics after it, which makes the model ready."""
+"""An edit over the first forward dynamics after it, which prepares the model."""
 
 
 def _seconds(call: Callable[[], Any]) -> float:
@@ -25,11 +25,11 @@ def _seconds(call: Callable[[], Any]) -> float:
 
 
 def locking(seconds: float = 0.2) -> list[Figure]:
-    """Of a chain of 100 000 links: ten of its hinges locked, coalesced, split and unlocked, and stopped by an impulse."""
+    """Time, on a chain of 100 000 links: ten of its hinges locked, coalesced, split and unlocked, and stopped by an impulse."""
     model, hinges = chain(GREAT, seed=1), [f"hinge{k * GREAT // FEW + 5}" for k in range(FEW)]
     rest = np.zeros(GREAT)
     model.forward_dynamics(rest, rest, rest)
-    model.lock(hinges), model.unlock()  # energy and momentum are asked for: the model is made ready for that, too
+    model.lock(hinges), model.unlock()  # requests energy and momentum, which prepares the model
     edits: dict[str, Callable[[], Any]] = {
         "ten hinges locked": lambda: model.lock(hinges),
         "ten bodies coalesced": model.coalesce,
@@ -51,7 +51,7 @@ def locking(seconds: float = 0.2) -> list[Figure]:
 
 
 def _evaluations(seconds: float) -> list[Figure]:
-    """Forward dynamics of 200 links of which every second hinge is locked, and coalesced, over that of all free."""
+    """Time forward dynamics of 200 links with every second hinge locked, and coalesced, over all free."""
     free, locked, coalesced = (chain(200, seed=1) for _ in range(3))
     for model in (locked, coalesced):
         model.lock([f"hinge{k}" for k in range(1, 200, 2)])

@@ -1,5 +1,5 @@
-"""What dynamics on loops costs (`pycraft bench`): how it grows with the loops, apart or in one ladder, by either method; that a tree does
-not pay for loops that are declared on it; and, where Pinocchio is there, its `constraintDynamics` on ladders and on Cassie."""
+"""Cost of dynamics on loops (`pycraft bench`): growth with the number of loops, apart or in one ladder, by either method; the cost for a
+tree of declared loops; and, if Pinocchio is installed, its `constraintDynamics` on ladders and on Cassie."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from .bench import Figure, in_turn
 
 SIZES = (10, 100, 1000, 10_000)
 GROWTH = 1.1
-"""Exponent of the time by the loops, least squares of its logarithm: one, and what larger models lose in caches."""
+"""Exponent of the time by the loops, least squares of its logarithm: one, plus the cache misses of larger models."""
 TREE = 1.1
-"""Of a direct call of a model with loops over the same without: one, and what clocks miss."""
+"""A direct call of a model with loops over the same without: one, plus the resolution of clocks."""
 RUNGS, COMPILED, BESIDE = 100, (1, 3, 10, 30), 1 / 3
-"""Of ladders that are computed by Pinocchio too, by the call and by the call compiled, and the share of its time that is ours at most."""
+"""Ladders that Pinocchio computes as well, by the call and by the compiled call, and our largest share of its time."""
 
 BY_HAND = 2.0
-"""Of a four-bar's accelerations compiled, over its own equations compiled."""
+"""A four-bar's compiled accelerations over its own compiled equations."""
 
 
 def ladder(rungs: int) -> Multibody:
-    """Cranks on the ground, each joined to the next by a rod: every loop shares its cranks with its neighbours."""
+    """Return cranks on the ground, each joined to the next by a rod: every loop shares its cranks with its neighbours."""
     model = n_four_bar(rungs)
     model.gravity = (0, -9.81, 0)
     return model
 
 
 def apart(loops: int) -> Multibody:
-    """Four-bars beside each other."""
+    """Return four-bars beside each other."""
     model = Multibody(f"{loops} four-bars")
     for i in range(loops):
         inboard = None
@@ -65,19 +65,20 @@ def _by_embedding(model: Multibody, q: np.ndarray) -> Callable[[], np.ndarray]:
 
 
 def _seconds(name: str, call: Callable[[], np.ndarray], expected: float) -> float:
-    """The least of some rounds, of this thread's own time: long calls are interrupted by others'. The cranks' accelerations are known."""
+    """Return the least time of some rounds, in this thread's own time, since other programs interrupt long calls. The cranks' accelerations
+    are known."""
     times: list[float] = []
     while len(times) < 5 or (len(times) < 100 and sum(times) < 0.2):
         begin = time.thread_time()
         vdot = call()
         times.append(time.thread_time() - begin)
-        if not abs(vdot[0] - expected) <= 1e-7 * abs(expected):  # of 10⁴ rungs eps times the square of their number
+        if not abs(vdot[0] - expected) <= 1e-7 * abs(expected):  # for 10⁴ rungs, eps times the square of their number
             raise _core.EvaluationError(f"{name} does not move as it should, in the run that times it")
     return min(times)
 
 
 def growth() -> list[Figure]:
-    """Exponents of the time of accelerations on loops, of ladders and of four-bars apart."""
+    """Return the exponents of the time of accelerations on loops, for ladders and for separate four-bars."""
     angle, figures = 1.0, []
     for name, make, by in (
         ("ladder", ladder, _by_augmentation),
@@ -100,14 +101,14 @@ def growth() -> list[Figure]:
 
 
 def _cranks(angle: float, rungs: int) -> tuple[np.ndarray, float]:
-    """A ladder's q and the accelerations of its cranks: of 1 kg and 1 m each, (n+1)/3 + n of inertia, (n+1)/2 + n of weight."""
+    """Return a ladder's q and the accelerations of its cranks: of 1 kg and 1 m each, (n+1)/3 + n of inertia, (n+1)/2 + n of weight."""
     n = rungs
     q = np.array([angle, -angle] * n + [angle])
     return q, -9.81 * math.cos(angle) * ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
 
 
 def tree_with_loops(seconds: float = 0.1) -> Figure:
-    """Forward dynamics of the tree of a ladder with its loops declared, over the same tree without them."""
+    """Time forward dynamics of the tree of a ladder with its loops declared, over the same tree without them."""
     model, bare = ladder(SIZES[0]), ladder(SIZES[0])
     for name in list(bare.loops):
         bare.loops.remove(name)
@@ -119,7 +120,7 @@ def tree_with_loops(seconds: float = 0.1) -> Figure:
 
 
 def four_bar_by_hand(seconds: float = 0.1) -> Figure:
-    """A four-bar's accelerations compiled over the equations that SymPy derives and prints for it, which certify nothing; both in C++."""
+    """Time a four-bar's compiled accelerations over the equations that SymPy derives and prints for it, without any checks; both in C++."""
     from ..sympy_bridge import four_bar_by_sympy
 
     model, rng = ladder(1), np.random.default_rng(0)
@@ -128,7 +129,7 @@ def four_bar_by_hand(seconds: float = 0.1) -> Figure:
     given = [np.column_stack([x, -x, x]) for x in (angles, speeds)] + [rng.normal(size=(8, 3))]
     by_hand = four_bar_by_sympy.accelerations(library, *given)
     wanted = np.array([compiled(*one) for one in zip(*given, strict=True)])
-    if not np.abs(by_hand - wanted).max() <= 1e-10 * np.abs(wanted).max():  # rounding times what an angle of 0.4 rad leaves of rows
+    if not np.abs(by_hand - wanted).max() <= 1e-10 * np.abs(wanted).max():  # rounding times the loss of rows at an angle of 0.4 rad
         raise _core.EvaluationError("a four-bar's own equations and its accelerations disagree, in the run that times them")
 
     def clock(place: str) -> Callable[[float], dict[str, float]]:
@@ -140,7 +141,7 @@ def four_bar_by_hand(seconds: float = 0.1) -> Figure:
 
 
 def _beside(name: str, ours: Callable[[], np.ndarray], theirs: Callable[[], np.ndarray], near: float, peer: Any, seconds: float) -> Figure:
-    """A call of ours over Pinocchio's; `near`: how far off it may be, of the largest acceleration."""
+    """Time our call over Pinocchio's; `near`: the tolerance, relative to the largest acceleration."""
     wanted = ours()
     if not np.abs(peer.ours(theirs()) - wanted).max() <= near * np.abs(wanted).max():
         raise _core.EvaluationError(f"Pinocchio and PyCraft disagree on {name}, in the run that times them")
@@ -149,14 +150,14 @@ def _beside(name: str, ours: Callable[[], np.ndarray], theirs: Callable[[], np.n
 
 
 def beside_pinocchio(seconds: float = 0.1, ladders: tuple[int, ...] = (*COMPILED, RUNGS)) -> list[Figure]:
-    """Accelerations on loops over Pinocchio's `constraintDynamics`: of ladders, balls for pins, and of Cassie; nothing without it."""
+    """Time accelerations on loops over Pinocchio's `constraintDynamics`: ladders, balls for pins, and Cassie; nothing without it."""
     if find_spec("pinocchio") is None:
         return []
     from ..peers.cassie import cassie
     from ..peers.pinocchio_loops import PinocchioLoops
 
     figures = []
-    tip = (1, 0, 0)  # rows across the plane ask nothing, so that it iterates: to the accuracy that is asked of ours
+    tip = (1, 0, 0)  # rows normal to the plane constrain nothing, so that it iterates: to the accuracy required of ours
     for rungs in ladders:
         model = ladder(rungs)
         (q, _), v = _cranks(1.0, rungs), np.zeros(model.nv)
@@ -171,10 +172,10 @@ def beside_pinocchio(seconds: float = 0.1, ladders: tuple[int, ...] = (*COMPILED
     state = model.assemble(model.q, np.random.default_rng(0).normal(size=model.nv))
     peer, tau = PinocchioLoops.of_balls(model), np.zeros(model.nv)
     ours = partial(model.compile("constrained_dynamics"), np.array(state.q), np.array(state.v), tau)
-    # Of its rows two hang on others: what its proximal steps leave of them, rounding over 1e-8 (docs/loops.md).
+    # Two of its rows depend on others: its proximal steps leave an error there, rounding over 1e-8 (docs/loops.md).
     return [*figures, _beside("Cassie, compiled", ours, peer.call(state.q, state.v, tau), 1e-2, peer, seconds)]
 
 
 def loops() -> list[Figure]:
-    """All of them."""
+    """Return all of these figures."""
     return [*growth(), tree_with_loops(), four_bar_by_hand(), *beside_pinocchio()]

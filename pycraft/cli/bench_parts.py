@@ -1,4 +1,5 @@
-"""What parts cost (`pycraft bench`): a call on a part and on the same bodies loaded alone, ratios of one run; results are the same bits."""
+"""Cost of parts (`pycraft bench`): a call on a part and on the same bodies loaded alone, ratios within one run; results have the same
+bits."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ CALLS = ("forward_dynamics", "inverse_dynamics", "mass_matrix")
 
 
 def _alone(part: Multibody) -> Multibody:
-    """The same bodies as a model that shares nothing."""
+    """Return the same bodies as a model that shares nothing."""
     return Multibody.from_description(part.description())
 
 
@@ -48,7 +49,7 @@ def _of_part(name: str, part: Multibody, seconds: float) -> list[Figure]:
 
 
 def _from_python(call: Callable[[], Any], seconds: float) -> dict[str, float]:
-    """The median time of a call, by hundreds."""
+    """Return the median time of a call, in groups of a hundred."""
     call()
     times: list[float] = []
     end = time.perf_counter() + seconds
@@ -62,7 +63,7 @@ def _results(model: Multibody, call: str, q: np.ndarray, v: np.ndarray, u: np.nd
 
 
 def parts(seconds: float = 0.2) -> list[Figure]:
-    """Of an arm of a humanoid, of a leg of a quadruped, and of the outer half of a long chain."""
+    """Measure an arm of a humanoid, a leg of a quadruped, and the outer half of a long chain."""
     humanoid, quadruped, long = robots.g1(), robots.a1(), chain(200, seed=1)
     chosen = {
         "g1, an arm": humanoid.subgraph(root=_behind(humanoid, "left_shoulder_pitch")),
@@ -73,5 +74,5 @@ def parts(seconds: float = 0.2) -> list[Figure]:
 
 
 def _behind(robot: Multibody, hinge: str) -> str:
-    """The body on the hinge whose name begins so."""
+    """Return the body on the hinge with a name that begins so."""
     return next(of.body.name for name, of in robot.hinges.items() if name.startswith(hinge))

@@ -1,7 +1,7 @@
 """`pycraft bench --peers`: one run beside other packages, shown as a table and written as JSON, a plot or docs/performance.md.
 
-A process of its own measures: NumPy's product of matrices, which belongs to a peer's call, has its threads counted when NumPy is imported,
-and the core that is pinned is given back.
+A separate process measures: NumPy's matrix product, which is part of a peer's call, sets its thread count when NumPy is imported, and the
+process is pinned to a core, which is released with it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """The environment of a process whose products of matrices run on one thread."""
+    """Provide the environment of a process with single-threaded matrix products."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
@@ -45,19 +45,19 @@ def _one_thread() -> Iterator[None]:
 
 
 def _measure_and_send(sender: Any, seconds: float, quick: bool) -> None:
-    """What the process of its own does: progress, then the figures or the error."""
+    """Run the measuring process: send progress, then the figures or the error."""
     try:
         found = measure(seconds, quick, lambda text: sender.send(("progress", text)))
         sender.send(("progress", "what accuracy costs"))
         sender.send(("measured", (found, costs_of_accuracy(seconds))))
-    except Exception as error:  # whatever it is: raised again in the process that asked
+    except Exception as error:  # any error: raised again in the calling process
         sender.send(("failed", error))
     finally:
         sender.close()
 
 
 def measured_apart(seconds: float, quick: bool, progress: Callable[[str], None]) -> tuple[Measured, list[Figure]]:
-    """Calls beside other packages' and what accuracy costs, measured in a process of its own on one core."""
+    """Return calls beside other packages' and the cost of accuracy, measured in a separate process on one core."""
     context = get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_measure_and_send, args=(sender, seconds, quick), daemon=True)
@@ -81,7 +81,7 @@ def measured_apart(seconds: float, quick: bool, progress: Callable[[str], None])
 
 
 def show(found: Measured, costs: list[Figure]) -> None:
-    """The run on the terminal."""
+    """Show the run on the terminal."""
     head, others = speed_page.headings(found), speed_page.packages(found)
     table = Table(title="Microseconds a call; ratio: the other package's time over ours, ✓ meets its goal, ✗ misses it", box=None)
     for i, heading in enumerate(head):
@@ -117,7 +117,7 @@ def _print(table: Table) -> None:
 
 
 def bench_peers(seconds: float, quick: bool, json: Path | None, plot: Path | None, page: Path | None) -> None:
-    """Measure, show and write. MissingPackageError, before anything is measured, where Pinocchio is not installed."""
+    """Measure, show and write. MissingPackageError, before any measurement, if Pinocchio is not installed."""
     other_packages(lambda text: None)
     with diagnostics.status("measuring") as status:
         found, costs = measured_apart(seconds, quick, lambda text: status.update(escape(f"measuring {text}")))

@@ -1,4 +1,4 @@
-"""What scenes cost (`pycraft bench`): a scene and the same written out by hand in C++, ratios of one run; results are the same bits."""
+"""Cost of scenes (`pycraft bench`): a scene and the same written by hand in C++, ratios within one run; results have the same bits."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..scenes import Scene, effects
 from .bench import Figure, _states, in_turn
 
 EMPTY, ONE, OFF, TEN = 1.05, 1.10, 1.03, 1.0
-"""Bounds: an empty scene over the bare kernel, one effect over the same by hand, effects that are off over none, ten over each alone."""
+"""Bounds: an empty scene over the bare kernel, one effect over the same by hand, disabled effects over none, ten over each alone."""
 
 
 def _by_hand(last: str) -> dict[str, list[effects.Effect]]:
-    """Scenes of nothing or one effect, by the name of what is written out by hand (cpp/bench/scenes_by_hand.h)."""
+    """Return scenes of no or one effect, by the name of the hand-written version (cpp/bench/scenes_by_hand.h)."""
     return {
         "nothing": [],
         "gravity": [effects.Gravity()],
@@ -31,7 +31,7 @@ def _by_hand(last: str) -> dict[str, list[effects.Effect]]:
 
 
 def _ten(last: str, hinge: str) -> list[effects.Effect]:
-    """Ten effects, three of which read the same poses."""
+    """Return ten effects, three of which read the same poses."""
     return [
         effects.Gravity(),
         effects.Damping(0.1),
@@ -55,12 +55,12 @@ def _timed_by_hand(model: Any, what: str, q: np.ndarray, v: np.ndarray, seconds:
 
 
 def _beside_hand(name: str, model: Any, seconds: float) -> list[Figure]:
-    """Each scene over the same written out by hand."""
+    """Time each scene over the same written by hand."""
     q, v, _ = _states(model)
     figures = []
     for what, of in _by_hand(list(model.bodies)[-1]).items():
         if what == "spring" and model.nq != model.nv:
-            continue  # by hand on coordinates that are numbers alone
+            continue  # the hand-written version supports scalar coordinates only
         scene = Scene(model).add(*of)
         vdot = _core.time_by_hand(model, what, q, v, 0.0)[1]
         if not np.array_equal(vdot, scene.evaluate(q[0], v[0]).vdot):
@@ -72,7 +72,7 @@ def _beside_hand(name: str, model: Any, seconds: float) -> list[Figure]:
 
 
 def _beside_itself(name: str, model: Any, seconds: float) -> list[Figure]:
-    """What is off, and ten effects over each alone."""
+    """Time disabled effects, and ten effects over each alone."""
     q, v, _ = _states(model)
     ten = _ten(list(model.bodies)[-1], list(model.hinges)[-1])
     off = Scene(model).add(*ten)
@@ -89,7 +89,7 @@ def _beside_itself(name: str, model: Any, seconds: float) -> list[Figure]:
 
 
 def scenes(seconds: float = 0.2) -> list[Figure]:
-    """All pairs, on two robots and a chain."""
+    """Return all pairs, on two robots and a chain."""
     from ..models import robots
 
     figures = []

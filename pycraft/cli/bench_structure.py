@@ -1,4 +1,4 @@
-"""What edits of a structure cost (`pycraft bench`): an edit of a model of 10⁵ bodies over a forward dynamics of it, ratios of one run."""
+"""Cost of edits of a structure (`pycraft bench`): an edit of a model of 10⁵ bodies over its forward dynamics, ratios within one run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .bench_frames import branched
 SIZE = 100_000
 EDIT, IMPULSE = 10.0, 250.0
 """Bounds. Each body is moved in memory and looked up by its hinge's name, a few times the nanoseconds that it takes in forward dynamics. An
-impulse compiles a copy of the model beside."""
+impulse also compiles a copy of the model."""
 
 
 def _took(call: Callable[[], Any]) -> float:
@@ -26,7 +26,7 @@ def _took(call: Callable[[], Any]) -> float:
 
 
 def _edits(model: Multibody, leaf: str, inner: str) -> dict[str, tuple[Callable[[], Any], float]]:
-    """Edits in an order in which each can be made, with their bounds."""
+    """Return edits in a possible order, with their bounds."""
     return {
         "detach a leaf": (lambda: model.detach(leaf), EDIT),
         "attach it elsewhere by a pin": (lambda: model.attach(leaf, "b7", "pin"), EDIT),
@@ -40,7 +40,7 @@ def _edits(model: Multibody, leaf: str, inner: str) -> dict[str, tuple[Callable[
 
 
 def structure(rounds: int = 3) -> list[Figure]:
-    """Edits of a tree of 10⁵ bodies, each the least of some rounds, over one forward dynamics."""
+    """Time edits of a tree of 10⁵ bodies, each the least of some rounds, over one forward dynamics."""
     model = branched(SIZE)
     model.detach("b0")
     rng = np.random.default_rng(1)

@@ -25,9 +25,9 @@ app = typer.Typer(
 
 Model = Annotated[str, typer.Argument(help="A TOML, URDF, SDF or MJCF file, or the name of a robot (see pycraft.load).")]
 Root = Annotated[
-    str | None, typer.Option(help="fixed | free: what carries the root link; by default fixed for files, and the robot's own for names.")
+    str | None, typer.Option(help="fixed | free: the carrier of the root link; by default fixed for files, and the robot's own for names.")
 ]
-Mimic = Annotated[str, typer.Option(help="couple | refuse | lock | free: what becomes of a file's mimic joints.")]
+Mimic = Annotated[str, typer.Option(help="couple | refuse | lock | free: how to treat a file's mimic joints.")]
 
 
 def _version(asked: bool) -> None:
@@ -46,14 +46,14 @@ def options(
 
 
 def load_model(name: str, root: str | None = None, mimic: str = "couple") -> Any:
-    """Return the model of a file, or a robot by its name. ModelError, with the nearest names, for what is neither."""
+    """Return the model of a file, or a robot by its name. ModelError, with the nearest names, if it is neither."""
     from ..models.loaders.load import load
 
     return load(name, root=root, mimic=mimic)
 
 
 def check_outputs(**paths: Path | None) -> None:
-    """Where files are to be written, before what goes into them is measured: the folder is there, a picture has a format."""
+    """Check output paths before the measurement: the folder exists, a picture has a format."""
     taken: dict[Path, str] = {}
     for option, path in paths.items():
         if path is None:
@@ -76,14 +76,14 @@ def check_outputs(**paths: Path | None) -> None:
 
 
 def check_least(least: int, **counts: int) -> None:
-    """Numbers of options that have a least value."""
+    """Check numbers of options that have a least value."""
     for option, count in counts.items():
         if count < least:
             fail(f"--{option} {count}: a whole number, {least} or more")
 
 
 def check_seconds(**durations: float | None) -> None:
-    """Seconds of options: finite, not negative."""
+    """Check seconds of options: finite, not negative."""
     for option, given in durations.items():
         if given is not None and not 0 <= given < float("inf"):
             fail(f"--{option} {given}: a finite number of seconds, zero or more")
@@ -115,7 +115,7 @@ def check(
 ) -> None:
     """Check every theorem on a model, or the displayed equations of a LaTeX paper (a .tex file, on random trees).
 
-    One line a theorem, the verdict first, what does not simply hold before the others.
+    One line per theorem, the verdict first; theorems that do not simply hold come before the others.
 
     Exit status 1 if something fails that should hold, 3 if something is undecided, or undefined on the model.
     """
@@ -183,14 +183,14 @@ def bench(
             bound = "" if figure.bound is None else f"{figure.bound:g} {figure.unit}"
             table.add_row(figure.name, f"{figure.value:.3g} {figure.unit}", bound, figure.note, style=style)
         console.print(table)
-    for figure in missed:  # in a file red is not seen
+    for figure in missed:  # red is invisible in a file
         text = f"{figure.name}: {figure.value:.3g} {figure.unit} is over its bound, {figure.bound:g} {figure.unit}"
         console.print(text, style="red", markup=False, highlight=False)
     raise typer.Exit(1 if missed else 0)
 
 
 def _write(table: Any, csv: Path | None, json: Path | None, plot: Path | None) -> None:
-    """The table as files, those that were asked for."""
+    """Write the table to the requested files."""
     if csv:
         table.to_csv(csv)
     if json:
@@ -216,18 +216,18 @@ def accuracy(
     method: Annotated[list[str] | None, typer.Option(help="Only this method, or integrator; may be repeated.")] = None,
     error: Annotated[float | None, typer.Option(help="Name the cheapest row whose error is at most this.")] = None,
     seconds: Annotated[float, typer.Option(help="Seconds per figure.")] = 0.05,
-    duration: Annotated[float | None, typer.Option(help="Seconds of the motion that is integrated; 1 if left out.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds of the integrated motion (default: 1).")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the states and forces.")] = 0,
-    front: Annotated[bool, typer.Option("--front", help="Print the Pareto front alone.")] = False,
+    front: Annotated[bool, typer.Option("--front", help="Print only the Pareto front.")] = False,
     csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw error against time (PNG, SVG or PDF).")] = None,
     root: Root = None,
     mimic: Mimic = "couple",
 ) -> None:
-    """What accuracy costs on a model: error, time and memory of every form, refinement, precision and method; or of integrators.
+    """Show the cost of accuracy on a model: error, time and memory of every form, refinement, precision and method; or of integrators.
 
-    Exit status 1 where every row is refused, or none reaches --error.
+    Exit status 1 if every row is refused, or none reaches --error.
     """
     from ..accuracy.tables.table import accuracy as measure
     from ..accuracy.tables.work_precision import INTEGRATORS, work_precision
@@ -297,10 +297,10 @@ def accuracy(
 
 @app.command()
 def stability(
-    seeds: Annotated[int, typer.Option(help="Random instances a case.")] = 200,
+    seeds: Annotated[int, typer.Option(help="Random instances per case.")] = 200,
     steps: Annotated[int, typer.Option(help="Steps of each trajectory.")] = 1_000_000,
-    case: Annotated[str, typer.Option(help="Only cases whose name or family has this text.")] = "",
-    peers: Annotated[bool, typer.Option(help="Pinocchio, MuJoCo, Drake, as far as they are installed, side by side.")] = True,
+    case: Annotated[str, typer.Option(help="Only cases with this text in their name or family.")] = "",
+    peers: Annotated[bool, typer.Option(help="Pinocchio, MuJoCo, Drake, if installed, side by side.")] = True,
     output: Annotated[Path | None, typer.Option(help="Where to write the table (Markdown).")] = None,
     csv: Annotated[Path | None, typer.Option(help="Write the rows as CSV.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the rows as JSON.")] = None,

@@ -18,13 +18,13 @@ def view(
         typer.Option(help="Add an effect: gravity, damping:0.1, spring:2,rest=0.1,hinges=arm_*; may be repeated."),
     ] = None,
     from_model: FromModel = False,
-    beside: Annotated[str | None, typer.Option(help="A second scene, as the first is given: a ghost that plays with it.")] = None,
+    beside: Annotated[str | None, typer.Option(help="A second scene, given like the first: a ghost that plays beside it.")] = None,
     seed: Annotated[int | None, typer.Option(help="Begin at the random state of this seed.")] = None,
     host: Annotated[str, typer.Option(help="Address to listen on (default: this machine only).")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port; 0 picks a free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
-    root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
-    mimic: Annotated[str, typer.Option(help="Of a model's file: couple | refuse | lock | free.")] = "couple",
+    root: Annotated[str | None, typer.Option(help="For a model: fixed | free.")] = None,
+    mimic: Annotated[str, typer.Option(help="For a model's file: couple | refuse | lock | free.")] = "couple",
 ) -> None:
     """Open a scene or a model in a live browser viewer: sliders, time, effects on and off, plots, values of picked bodies.
 

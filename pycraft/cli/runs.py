@@ -1,4 +1,4 @@
-"""`pycraft run`: a scene simulated, from its file or from a model and effects of the command line."""
+"""`pycraft run`: simulate a scene, from its file or from a model and effects of the command line."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ..tidy import seconds_text
 from .terminal import console, diagnostics, fail, note
 
 SHOWN = 500
-"""States that are kept where --every is left out."""
+"""Number of states kept without --every."""
 _SHOWN_BY = {".html": "to_html", ".glb": "to_gltf", ".gltf": "to_gltf", ".usda": "to_usd", ".usdc": "to_usd", ".usd": "to_usd"}
-"""By a file's ending, what writes a run to be looked at."""
-_WRITTEN = "Write the run: .nc (NetCDF), .parquet or .csv; to be looked at: .html, .glb or .gltf (glTF), .usda, .usdc or .usd."
+"""Writers of viewable runs, by a file's ending."""
+_WRITTEN = "Write the run: .nc (NetCDF), .parquet or .csv; to view it: .html, .glb or .gltf (glTF), .usda, .usdc or .usd."
 
 
 FromModel = Annotated[
@@ -24,7 +24,7 @@ FromModel = Annotated[
 
 
 def add_offered(scene: Any, wanted: bool) -> None:
-    """Add the effects that the model's file describes where they are wanted, and report what no effect stands for."""
+    """Add the effects that the model's file describes if requested, and report elements that no effect represents."""
     if not wanted:
         return
     from ..scenes.effects import from_model
@@ -46,22 +46,22 @@ def run(
     ] = None,
     from_model: FromModel = False,
     duration: Annotated[
-        float | None, typer.Option("-T", "--duration", help="Seconds to simulate; what a scene's file says if left out.")
+        float | None, typer.Option("-T", "--duration", help="Seconds to simulate (default: the value in the scene's file).")
     ] = None,
-    integrator: Annotated[str | None, typer.Option(help="dopri5 if neither this nor the scene's file says.")] = None,
+    integrator: Annotated[str | None, typer.Option(help="Integrator (default: the scene file's, else dopri5).")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of a step.")] = None,
-    step: Annotated[float | None, typer.Option(help="Seconds, of integrators with steps of one size.")] = None,
+    step: Annotated[float | None, typer.Option(help="Seconds, for integrators with constant steps.")] = None,
     every: Annotated[
-        float | None, typer.Option(help=f"Seconds between the states that are kept; a {SHOWN}th of the run if left out.")
+        float | None, typer.Option(help=f"Seconds between the states that are kept (default: a {SHOWN}th of the run).")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Begin at the random state of this seed.")] = None,
     plot: Annotated[bool, typer.Option("--plot", help="Draw coordinates, energies and forces: a PNG beside the output, or here.")] = False,
     save: Annotated[Path | None, typer.Option(help="Write the scene, with its effects and these options, as TOML.")] = None,
-    root: Annotated[str | None, typer.Option(help="Of a model: fixed | free.")] = None,
-    mimic: Annotated[str, typer.Option(help="Of a model's file: couple | refuse | lock | free.")] = "couple",
+    root: Annotated[str | None, typer.Option(help="For a model: fixed | free.")] = None,
+    mimic: Annotated[str, typer.Option(help="For a model's file: couple | refuse | lock | free.")] = "couple",
 ) -> None:
-    """Simulate a scene: its file, or a model with the effects that are named, and no others.
+    """Simulate a scene: its file, or a model with only the named effects.
 
     pycraft run scene.toml -o run.nc; pycraft run panda --effect gravity --effect damping:0.1 -T 5 --plot
     """
@@ -111,12 +111,12 @@ def _check_output(path: Path) -> None:
 
 
 def _write(run: Any, path: Path) -> None:
-    """The run as a file, by its ending."""
+    """Write the run to a file, by its ending."""
     getattr(run, _SHOWN_BY.get(path.suffix, "save"))(path)
 
 
 def loaded_scene(what: str, root: str | None, mimic: str) -> Any:
-    """The scene of a file, of a mechanism, or an empty one of a model."""
+    """Return the scene of a file or a mechanism, or an empty one of a model."""
     from ..models import robots
     from ..scenes import Scene, load_scene, mechanisms
     from .commands import load_model
@@ -139,7 +139,7 @@ def _is_scene(path: str) -> bool:
 
 
 def _simulated(scene: Any, options: dict[str, Any], output: Path | None) -> Any:
-    """The run. What was computed before an error or Ctrl-C is written all the same, where a run is written."""
+    """Return the run. If a run is written to a file, states computed before an error or Ctrl-C are written as well."""
     T = options.pop("T")
     times = _times(T, options.pop("every", None))
     try:
@@ -148,12 +148,12 @@ def _simulated(scene: Any, options: dict[str, Any], output: Path | None) -> Any:
         before = getattr(error, "run", None)
         if output is not None and before is not None and len(before):
             _write(before, output)
-            note(f"wrote {output}, as far as it had come: to {before.t[-1]:g} s")
+            note(f"wrote {output} up to {before.t[-1]:g} s")
         raise
 
 
 def _times(T: float, every: float | None) -> np.ndarray | None:
-    """From 0 to T, T among them; None where T is for the scene to refuse."""
+    """Return the times from 0 to T, including T; None if the scene must refuse T."""
     if every is not None and not 0 < every < float("inf"):
         fail(f"--every {every:g}: a positive number of seconds")
     if not 0 < T < float("inf"):
@@ -168,7 +168,7 @@ def _times(T: float, every: float | None) -> np.ndarray | None:
 
 
 def _told(scene: Any, found: Any) -> str:
-    """What was run, in a few lines."""
+    """Return a summary of the run in a few lines."""
     about, energy = found.statistics, found.energy
     drift = float(np.ptp(found.balance))
     lines = [

@@ -1,4 +1,4 @@
-"""What `pycraft bench --peers` shows of a run: the table for the terminal, docs/performance.md."""
+"""Output of `pycraft bench --peers`: the table for the terminal, docs/performance.md."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ COMPARED: dict[str, dict[str, str]] = {
         "MuJoCo": "`mj_kinematics`, `mj_comPos`, `mj_crb`, `mj_factorM`, `mj_solveM`",
     },
 }
-"""The calls of other packages that are timed, by call and package."""
+"""The timed calls of other packages, by call and package."""
 
 
 def number(value: float | None) -> str:
-    """Three digits, without an exponent up to a million."""
+    """Return three digits, without an exponent up to a million."""
     if value is None:
         return ""
     return f"{value:,.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"
@@ -54,22 +54,23 @@ def _time(time: Time | None) -> str:
 
 
 def _ratio(ratio: float | None, met: bool | None) -> str:
-    """A ratio to three digits, with a mark where there is a goal."""
+    """Return a ratio to three digits, with a mark if there is a goal."""
     return "" if ratio is None else f"{ratio:.3g}" + {None: "", True: " ✓", False: " ✗"}[met]
 
 
 def packages(found: Measured) -> list[str]:
-    """The other packages that were timed, Pinocchio first."""
+    """Return the other packages that were timed, Pinocchio first."""
     return list(dict.fromkeys(name for row in found.rows for name in row.peers))
 
 
 def headings(found: Measured) -> list[str]:
-    """Of the table: in C++ ours, Pinocchio's and their ratio; from Python ours, all packages' and the ratio of the fastest."""
+    """Return the headings of the table: in C++ ours, Pinocchio's and their ratio; from Python ours, all packages' and the ratio of the
+    fastest."""
     return ["model", "nv", "C++", "Pinocchio", "ratio", "Python", *packages(found), "ratio"]
 
 
 def cells(row: Row, others: Iterable[str]) -> list[str]:
-    """One line of the table: times in microseconds, ratios over ours."""
+    """Return one line of the table: times in microseconds, ratios over ours."""
     cpp, python = row.met
     theirs = [_time(row.peers.get(name)) for name in others]
     own = [row.model, str(row.nv), _time(row.kernel), _time(row.peer_kernel), _ratio(row.ratio, cpp)]
@@ -77,12 +78,12 @@ def cells(row: Row, others: Iterable[str]) -> list[str]:
 
 
 def of_call(found: Measured, call: str) -> list[Row]:
-    """The rows of one call."""
+    """Return the rows of one call."""
     return [row for row in found.rows if row.call == call]
 
 
 def goals(found: Measured) -> list[list[str]]:
-    """By call: the goal in C++, how many models meet it, the range of ratios; the same from Python."""
+    """Return, by call: the goal in C++, how many models meet it, the range of ratios; the same from Python."""
     lines = []
     for call, both in GOALS.items():
         line = [CALLS[call]]
@@ -100,7 +101,7 @@ BATCH_HEADINGS = ["model", "nv", "double, a state", "ratio", "single, a state", 
 
 
 def batch_cells(found: Measured) -> list[list[str]]:
-    """Lines of the table of batches."""
+    """Return the lines of the table of batches."""
     lines = []
     for row in found.batches:
         line = [row.model, str(row.nv)]
@@ -116,7 +117,7 @@ COMPILED_HEADINGS = ["model", "nv", "call", "operations", "build, s", "C++", "th
 
 
 def compiled_cells(found: Measured) -> list[list[str]]:
-    """Lines of the table of code compiled for one model."""
+    """Return the lines of the table of code compiled for one model."""
     lines = []
     for row in found.compiled:
         line = [row.model, str(row.nv), CALLS[row.call], f"{row.operations:,}", f"{row.built:.1f}", _time(row.kernel), _time(row.ordinary)]
@@ -125,7 +126,7 @@ def compiled_cells(found: Measured) -> list[list[str]]:
 
 
 def cost_cells(figures: list[Figure]) -> list[list[str]]:
-    """Lines of the table of what accuracy costs."""
+    """Return the lines of the table of the cost of accuracy."""
     return [[f.name, f"{f.value:.3g}", "" if f.bound is None else f"{f.bound:g}" + (" ✓" if f.passed else " ✗"), f.note] for f in figures]
 
 
@@ -133,13 +134,13 @@ COST_HEADINGS = ["way", "ratio", "bound", "time and error"]
 
 
 def fitted(found: Measured) -> list[list[str]]:
-    """Lines of the table of exponents, ours and Pinocchio's."""
+    """Return the lines of the table of exponents, ours and Pinocchio's."""
     own, theirs = exponents(found.rows), exponents(found.rows, peer=True)
     return [[CALLS[call], f"{p:.2f}", f"{theirs[call]:.2f}" if call in theirs else ""] for call, p in own.items()]
 
 
 def _markdown(head: list[str], lines: list[list[str]], words: int = 1) -> str:
-    """A table whose first columns, so many, are words."""
+    """Return a table; its first `words` columns are text."""
     rule = ["---" if i < words else "---:" for i in range(len(head))]
     return "\n".join("| " + " | ".join(line) + " |" for line in (head, rule, *lines)) + "\n"
 
@@ -166,7 +167,7 @@ def _calls(found: Measured) -> str:
 
 
 def page(found: Measured, costs: list[Figure]) -> str:
-    """docs/performance.md: everything on it is measured in the run that writes it."""
+    """Return docs/performance.md: all its figures are measured in the run that writes it."""
     machine = "\n".join(f"- {name}: {value}" for name, value in found.machine.items())
     batch_goals = BATCH_GOALS[found.machine["instruction set"]]
     asked = " and ".join(f"{goal:g} in {p}" for goal, p in zip(batch_goals, ("double", "single"), strict=True) if goal) or "none here"
@@ -178,24 +179,25 @@ Written by `pycraft bench --peers --page docs/performance.md`: no figure on this
 
 {machine}
 
-Compare figures of one run alone: another machine has others.
+Compare only figures of one run: they differ between machines.
 
-Times are microseconds. Each is the least median of several rounds on one core, after a warm-up; what a ratio compares is timed in turn. A
-ratio is the other package's time over ours: above one ours is faster; ✓ meets its goal, ✗ misses it. All results agree in the run that
-times them, to {WRONG:g} of the largest entry: with every package's, and where none goes, with our own in extended precision.
+Times are microseconds. Each is the least median of several rounds on one core, after a warm-up; the two times of a ratio are taken in
+turns. A ratio is the other package's time over ours: above one ours is faster; ✓ meets its goal, ✗ misses it. All results are compared in
+the run that times them, and agree to {WRONG:g} of the largest entry with every package, or, where no package runs, with our own in
+extended precision.
 
-*C++* is our call in the core, its checks included, over {STATES} states in rotation. Pinocchio's time in C++ is, of forward and inverse
-dynamics of up to 100 coordinates, that of its own loops in C++ over states (`abaInParallel`, `rneaInParallel`, one thread); of all else its
-call from Python less the same call on a model without joints and less the copies of matrices that its bindings make. *Python* is a call
-from Python on arrays that are ready; the ratio is over the fastest package.
+*C++* is our call in the core, its checks included, over {STATES} states in rotation. For forward and inverse dynamics of up to 100
+coordinates, Pinocchio's time in C++ is the time of its own C++ loops over states (`abaInParallel`, `rneaInParallel`, one thread);
+otherwise it is its call from Python less the same call on a model without joints and less the copies of matrices that its bindings make.
+*Python* is a call from Python on existing arrays; the ratio is to the fastest package.
 
 {_compared(found)}
-ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python fills both triangles, too, and that is counted. MuJoCo's calls leave
-contacts and constraints off; its `mj_forward` computes positions, inertias, their factors and accelerations, and no state is set while the
-clock runs. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest joints; robots are as
-their files have them, legged ones on a free base. Λ is that of the last body, 6 × 6, and of it and the one in the middle, 12 × 12,
-where both move in every direction; Pinocchio's time is that of its inverse alone, which is then to be inverted, less that on a model of
-one joint.
+ℳ and ℳ⁻¹ are full and symmetric here; Pinocchio's `crba` from Python also fills both triangles, and its time includes this. MuJoCo's
+calls have contacts and constraints disabled; its `mj_forward` computes positions, inertias, their factors and accelerations, and the time
+does not include setting a state. Pins of the chains turn about y, x and z in turn, the axes for which other packages have their fastest
+joints; robots are used as in their files, legged ones on a free base. Λ is computed for the last body, 6 × 6, and for the last and the
+middle body together, 12 × 12, if both move in every direction; Pinocchio's time covers only its inverse, which remains to be inverted,
+less the time on a model of one joint.
 
 ## Goals
 
@@ -205,30 +207,29 @@ one joint.
 {_calls(found)}
 ## Batches
 
-Forward dynamics of {BATCH} states at once from Python, a state's share, and one call of Pinocchio's in C++ over it. Goals on this
+Forward dynamics of {BATCH} states at once from Python, per state, and the ratio of one call of Pinocchio's in C++ to it. Goals on this
 instruction set: {asked}.
 
 {_markdown(BATCH_HEADINGS, batch_cells(found))}
 ## Code for one model
 
-Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, beside the call itself and Pinocchio's in
-C++; ratios over the compiled call. Code that is built on the machine that runs it uses all of its instructions, fused ones among them.
+Calls compiled for their model ([compiled.md](compiled.md)), one state after another in C++, compared with the ordinary call and
+Pinocchio's in C++; ratios to the compiled call. Code built where it runs uses all instructions of the machine.
 
 {_markdown(COMPILED_HEADINGS, compiled_cells(found), words=3)}
-## How cost grows
+## Growth of cost
 
-The fitted p of time ~ Nᵖ in C++, on chains of {FITTED_FROM} links and more, up to the longest that was timed. ℳ and ℳ⁻¹ have N² entries,
+The fitted p of time ~ Nᵖ in C++, on chains of {FITTED_FROM} links and more, up to the longest one timed. ℳ and ℳ⁻¹ have N² entries,
 derivatives twice and three times as many.
 
 {_markdown(["call", "p, ours", "p, Pinocchio"], fitted(found))}
-## What accuracy costs
+## Cost of accuracy
 
 Forward dynamics in other forms and precisions, as a ratio to form `fast` in double, timed in turn; errors against quad precision; ✓ is
-within its bound, ✗ over it. Direct calls of forward dynamics run kernels in every way that stands here.
-What each way is for:
-[accuracy.md](accuracy.md).
+within its bound, ✗ over it. Direct calls of forward dynamics run kernels in every row here. [accuracy.md](accuracy.md)
+describes each method.
 
 {_markdown(COST_HEADINGS, cost_cells(costs))}
-## Left out
+## Not measured
 
 {left_out}"""

@@ -1,4 +1,4 @@
-"""Cost against length, as `pycraft bench --peers --plot` draws it: one panel a call, logarithmic axes, fitted exponents."""
+"""Cost against length, drawn by `pycraft bench --peers --plot`: one panel per call, logarithmic axes, fitted exponents."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _line(ax: Any, rows: list[Row], times: Sequence[Time | None], label: str, ex
 
 
 def _batches(ax: Any, found: Measured) -> None:
-    """A state's share of a batch, and one call for comparison."""
+    """Draw the time per state of a batch, and one call for comparison."""
     chains = [row for row in found.batches if row.model.startswith("chain")]
     one = [row for row in of_call(found, "forward_dynamics") if row.model.startswith("chain") and row.nv in {c.nv for c in chains}]
     for label, sizes, times, colour, marker in (

@@ -1,4 +1,4 @@
-"""How commands speak: results on stdout, everything else on stderr, every failure one line and an exit status."""
+"""Output of commands: results on stdout, everything else on stderr, every failure one line and an exit status."""
 
 from __future__ import annotations
 
@@ -25,18 +25,19 @@ diagnostics = Console(stderr=True)
 
 
 def note(text: str) -> None:
-    """A line on stderr."""
+    """Write a line to stderr."""
     diagnostics.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def fail(text: str, status: int = REFUSED) -> NoReturn:
-    """End a command with an error's text in one line."""
+    """End a command with an error message in one line."""
     note(f"error: {' '.join(text.split())}")
     raise typer.Exit(status)
 
 
 class Commands(TyperGroup):
-    """Commands whose failures are lines, not tracebacks. PYCRAFT_TRACEBACK=1 in the environment shows where an unexpected one arose."""
+    """Commands that fail with one line instead of a traceback. PYCRAFT_TRACEBACK=1 in the environment shows the origin of an unexpected
+    one."""
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
         if sys.stdout is None:
@@ -44,7 +45,7 @@ class Commands(TyperGroup):
         return _guarded(lambda: super(Commands, self).make_context(*arguments, **options))
 
     def invoke(self, ctx: Any) -> Any:
-        # Letters that a terminal cannot show are escaped, so that a result is never lost to them.
+        # Letters that a terminal cannot show are escaped, so that they never prevent a result.
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")
@@ -54,7 +55,7 @@ class Commands(TyperGroup):
 
 @contextmanager
 def warnings_as_notes() -> Iterator[None]:
-    """Show each ModelWarning as a line on stderr, without the place in the code that led to it."""
+    """Show each ModelWarning as a line on stderr, without its place in the code."""
     from ..models.warning import ModelWarning
 
     with warnings.catch_warnings():
@@ -78,7 +79,7 @@ def _guarded(run: Callable[[], Any]) -> Any:
         raise
     except _core.Error as error:
         fail(str(error))
-    except BrokenPipeError:  # the reader has seen enough
+    except BrokenPipeError:  # the reader closed the pipe
         _let_go(sys.stdout)
         raise typer.Exit(1) from None
     except OSError as error:
@@ -86,7 +87,7 @@ def _guarded(run: Callable[[], Any]) -> Any:
         fail(f"{error.filename or 'the output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         fail("interrupted", INTERRUPTED)
-    except Exception as error:  # whatever nobody expected is one line, too
+    except Exception as error:  # unexpected errors are also one line
         _tell_usage(error)
         if os.environ.get("PYCRAFT_TRACEBACK") or type(error).__module__.startswith(("click", "typer")):
             raise
@@ -95,7 +96,7 @@ def _guarded(run: Callable[[], Any]) -> Any:
 
 
 def _tell_usage(error: Exception) -> None:
-    """End with what typer has to say of arguments that cannot be, in one line. Not where there were none: it then shows the help."""
+    """End with typer's message on invalid arguments, in one line. Without arguments it shows the help instead."""
     message = getattr(error, "format_message", None)
     if message is None or type(error).__name__ == "NoArgsIsHelpError":
         return
@@ -104,7 +105,7 @@ def _tell_usage(error: Exception) -> None:
 
 
 def _flushed(run: Callable[[], Any]) -> Any:
-    """A full disk is noticed when the result is written, at the latest here."""
+    """Flush the output, so that a full disk is noticed here at the latest."""
     try:
         result = run()
     except typer.Exit:
@@ -115,7 +116,7 @@ def _flushed(run: Callable[[], Any]) -> Any:
 
 
 def _let_go(stream: TextIO) -> None:
-    """What is left in a stream that cannot be written is dropped: the interpreter would try it again at its end."""
+    """Drop the rest of a stream that cannot be written: the interpreter would try again at its end."""
     try:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     except (OSError, ValueError):  # not a file: a test's, a notebook's

@@ -1,4 +1,4 @@
-"""The tour: what the workbench does, on one robot, in a terminal."""
+"""The tour: an overview of the workbench, on one robot, in a terminal."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def run(robot: Any, console: Console) -> None:
 
 
 class Say:
-    """Headings, formulas and what they give, in one look."""
+    """Headings, formulas and results, in one style."""
 
     def __init__(self, console: Console):
         self.console = console
@@ -109,7 +109,7 @@ def _show_operators(robot: Any, MM: _core.Operator, soa: Any, say: Say) -> None:
 
 
 def _pattern(operator: _core.Operator) -> str:
-    """Blocks as dots and squares, last body first."""
+    """Return blocks as dots and squares, last body first."""
     norms = operator.blocks(order="tip-to-base").norms()
     return "\n".join(" ".join("■" if x > 1e-14 else "·" for x in row) for row in norms)
 
@@ -120,7 +120,7 @@ def _show_factorization(robot: Any, MM: _core.Operator, soa: Any, say: Say) -> N
     system = MM + J if robot.has_rotor_inertia else MM
     name = "(MM + J)" if robot.has_rotor_inertia else "MM"
     if robot.has_rotor_inertia:
-        say.text("This robot has rotor inertia: the hinge-diagonal J stands in D, and it is MM + J that the factors invert.")
+        say.text("This robot has rotor inertia: the hinge-diagonal J enters D, and the factors invert MM + J.")
     S = I - H @ psi @ K
     by_hand = S.T @ D.inv() @ S
     x = np.ones(robot.nv)
@@ -194,7 +194,7 @@ def _show_theorems(robot: Any, soa: Any, say: Say) -> None:
 
 
 def _show_growth(say: Say) -> None:
-    say.heading("What it costs: chains of rods")
+    say.heading("Cost: chains of rods")
     table = Table(box=None, header_style="bold")
     for column in ("links", "ℳx, µs", "ℳ⁻¹x, µs", "ns a link, ℳ⁻¹x"):
         table.add_column(column, justify="right")

@@ -1,7 +1,7 @@
 """Closed forms: every operator of a small mechanism as a SymPy matrix of formulas in its coordinates.
 
 Cost: the entries of P, D, K, ψ, ... grow exponentially with the coordinates (docs/symbolic.md has the counts), so `symbolic` refuses
-mechanisms beyond four of them unless it is forced to. SymPy is imported when it is first asked for.
+mechanisms beyond four of them unless it is forced to. SymPy is imported on first use.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LARGEST = 4
 
 _TAKES = {s.name: s.takes for s in _core.symbols}
-"""What letters are called with."""
+"""Letters and their arguments."""
 
 
 def symbolic(
@@ -35,27 +35,27 @@ def symbolic(
     unit_quaternions: bool = False,
     force: bool = False,
 ) -> ClosedForms:
-    """Closed forms of a mechanism's operators: any expression of its letters as a SymPy matrix.
+    """Return closed forms of a mechanism's operators: any expression of its letters as a SymPy matrix.
 
     Parameters
     ----------
     model : Multibody
-        Its structure, numbers and gravity as they are now; later edits do not show.
+        Its structure, parameters and gravity at present; later edits have no effect.
     names : sequence of nq names or SymPy symbols, or one string of names
-        Of the coordinates q; q1, q2, ... if left out. Velocities are v1, v2, ... (nv).
+        For the coordinates q; default: q1, q2, .... Velocities are v1, v2, ... (nv).
     parameters : {"numeric", "symbolic"} or mapping
-        "numeric": masses, lengths, ... are exact fractions (or roots) equal to the model's doubles. "symbolic": every one that is not
-        zero is a symbol: masses m1, m2, ..., uniform rods along x have lengths l1, l2, ..., other bodies centres of mass c1x, ..., inertias
-        I1xx, ..., places p1x, ..., rotor inertias J1, ..., pitches h1, points of axes o1x, ..., gravity g; rotations and axes stay
-        numbers. A mapping gives some, e.g. ``{("upper", "mass"): "m", ("upper", "com"): [l / 2, 0, 0], "gravity": [0, 0, "-g"]}``:
-        the keys are (body, "mass" | "com" | "inertia" | "position" | "rotation" | "rotor_inertia" | "pitch"), (node, "position") and
-        "gravity", the values SymPy expressions or names of symbols, "-g" for a negative one.
+        "numeric": masses, lengths, ... are exact fractions (or roots) equal to the model's doubles. "symbolic": every nonzero one is a
+        symbol: masses m1, m2, ..., uniform rods along x have lengths l1, l2, ..., other bodies centres of mass c1x, ..., inertias I1xx,
+        ..., places p1x, ..., rotor inertias J1, ..., pitches h1, points of axes o1x, ..., gravity g; rotations and axes stay numeric. A
+        mapping replaces some of them, e.g. ``{("upper", "mass"): "m", ("upper", "com"): [l / 2, 0, 0], "gravity": [0, 0, "-g"]}``: the keys
+        are (body, "mass" | "com" | "inertia" | "position" | "rotation" | "rotor_inertia" | "pitch"), (node, "position") and "gravity", the
+        values SymPy expressions or names of symbols, "-g" for a negative one.
     simplify : bool
-        Show the shortest of several forms (reduced, factored, with sums of angles); otherwise the reduced fraction as it comes.
+        Return the shortest of several forms (reduced, factored, with sums of angles); otherwise the reduced fraction.
     unit_quaternions : bool
-        Take the quaternions of ball and free hinges as of unit length. Otherwise they enter as q/|q|, as everywhere in pycraft.
+        Assume unit quaternions for ball and free hinges. Otherwise they enter as q/|q|, as everywhere in pycraft.
     force : bool
-        Go ahead beyond four coordinates.
+        Proceed beyond four coordinates.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def symbolic(
     Raises
     ------
     ModelError
-        The mechanism is too large, a name or parameter does not fit, or the model is not a Multibody.
+        The mechanism is too large, a name or parameter does not match, or the model is not a Multibody.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def symbolic(
     l2**2*m2/3
     """
     if not isinstance(model, _core.Multibody):
-        raise _core.ModelError(f"closed forms are made of a Multibody, not of {type(model).__name__}: its coordinates are the symbols")
+        raise _core.ModelError(f"closed forms need a Multibody, not a {type(model).__name__}: its coordinates are the symbols")
     if not force and model.nv > LARGEST and not _single_step(model):
         raise _core.ModelError(
             f"{model.name!r} has {model.nv} coordinates; closed forms grow exponentially with them, so beyond {LARGEST} they are no longer "
@@ -89,18 +89,18 @@ def symbolic(
 
 
 def _single_step(model: Multibody) -> bool:
-    """One body on one subhinge: a free body's operators are short."""
+    """Return whether the model is one body on one subhinge: a free body's operators are short."""
     bodies = model.description()["bodies"]
     return len(bodies) == 1 and len(bodies[0]["hinge"]["subhinges"]) <= 1
 
 
 class ClosedForms:
-    """The operators of one mechanism as SymPy matrices, see `symbolic`. Letters are attributes; each is computed when first read.
+    """The operators of one mechanism as SymPy matrices; see `symbolic`. Letters are attributes; each is computed on first use.
 
     Attributes
     ----------
     q, v : tuples of symbols, (nq,) and (nv,)
-    parameters : dict from the symbols of masses, lengths, ... to the model's numbers, where they are known
+    parameters : dict from the symbols of masses, lengths, ... to the model's values, if known
     MM, mass_matrix, mass_matrix_inverse, innovations, bias_forces : ℳ = HφMφ*H*; ℳ + J; its inverse; I - HψK; 𝒞 with gravity, (nv, 1)
     """
 
@@ -142,7 +142,7 @@ class ClosedForms:
         return [*super().__dir__(), *LETTERS]
 
     def __call__(self, names: str) -> Any:
-        """Several letters at once: ``M, D = s("M D")``."""
+        """Return several letters at once: ``M, D = s("M D")``."""
         made = tuple(getattr(self, name) for name in names.split())
         return made[0] if len(made) == 1 else made
 
@@ -163,13 +163,13 @@ class ClosedForms:
 
     # ------------------------------------------------------------------ expressions
     def evaluate(self, expression: Any, given: Mapping[str, Any] | None = None) -> Any:
-        """An operator or scalar expression as a SymPy matrix (codomain, domain), or as a SymPy number.
+        """Return an operator or scalar expression as a SymPy matrix (codomain, domain), or as a SymPy number.
 
         Parameters
         ----------
         expression : an expression of this model's letters (not bound to a state), or a letter's name
-        given : what named vectors and constants stand for, as arrays of SymPy expressions; a vector "T" that is not listed has the
-            entries T1, T2, ..., a constant that is not listed its numbers
+        given : values of named vectors and constants, as arrays of SymPy expressions; by default a vector "T" has the entries T1, T2, ...,
+            and a constant its own values
 
         Returns
         -------
@@ -178,9 +178,9 @@ class ClosedForms:
         Raises
         ------
         EvaluationError
-            The expression is of another model, bound to a state (`.at(q)`), an I without a space, or made of a Python function.
+            The expression belongs to another model, is bound to a state (`.at(q)`), is an I without a space, or is a Python function.
         SingularHingeError, SingularOperatorError
-            D(k), or what is inverted, is singular at every state.
+            D(k), or an operator to invert, is singular at every state.
         """
         return self._value(expression, given or {}, self._simplify)
 
@@ -190,7 +190,7 @@ class ClosedForms:
         if isinstance(expression, _core.Scalar):
             return self._scalar(expression, given, simplify)
         if not isinstance(expression, _core.Operator):
-            raise TypeError(f"closed forms are of operator expressions, not of {type(expression).__name__}")
+            raise TypeError(f"closed forms need an operator expression, not a {type(expression).__name__}")
         return self._matrix(expression, given).sympy(simplify)
 
     def _matrix(self, expression: Any, given: Mapping[str, Any]) -> Matrix:
@@ -203,11 +203,11 @@ class ClosedForms:
         made = walk.of(expression)
         self._field = walk.field
         if expression.domain is None:
-            raise _core.EvaluationError(f"{expression.text()} is said of no space: an I takes its space from an operator beside it")
+            raise _core.EvaluationError(f"{expression.text()} has no space: an I takes its space from an operator beside it")
         return made
 
     def _sample(self) -> dict[Any, float]:
-        """A state and parameters at which signs are looked at: the model's numbers, and a random state."""
+        """Return a state and parameters for testing signs: the model's values, and a random state."""
         state = self.model.random_state(1)
         known = dict(zip([*self.q, *self.v], [*state.q, *state.v], strict=True))
         return {x: float(value) for x, value in (known | self.parameters).items()}
@@ -240,14 +240,14 @@ class ClosedForms:
         return sympy.sqrt(show((matrix.T @ matrix).trace()))
 
     def diff(self, expression: Any, coordinate: int | str, given: Mapping[str, Any] | None = None) -> Any:
-        """∂_i of an expression, a letter's name or a SymPy matrix: along the velocity of coordinate i, v held fixed.
+        """Return ∂_i of an expression, a letter's name or a SymPy matrix: along the velocity of coordinate i, v held fixed.
 
         For ball and free hinges that is the directional derivative along the body twist e_i, q̇ = Γ(q)e_i.
         """
         return self._along(expression, [int(k == self._coordinate(coordinate)) for k in range(len(self.v))], given)
 
     def dot(self, expression: Any, given: Mapping[str, Any] | None = None) -> Any:
-        """The time derivative along v, v itself held fixed."""
+        """Return the time derivative along v, with v held fixed."""
         return self._along(expression, self.v, given)
 
     def _along(self, expression: Any, direction: Sequence[Any], given: Mapping[str, Any] | None) -> Any:
@@ -262,13 +262,13 @@ class ClosedForms:
         return value.applyfunc(turned) if isinstance(value, sympy.MatrixBase) else turned(value)
 
     def _again(self, e: Any) -> Any:
-        """A derivative brought to the form of the entries, where it is a rational function again."""
+        """Return a derivative in the form of the entries, if it is a rational function again."""
         try:
             return self._field.expression(self._field.element(e), self._simplify)
         except _core.EvaluationError:
             return e
 
-    # ------------------------------------------------------------------ numbers
+    # ------------------------------------------------------------------ values
     def at(
         self,
         expression: Any,
@@ -277,9 +277,9 @@ class ClosedForms:
         values: Mapping[Any, float] | None = None,
         given: Mapping[str, Any] | None = None,
     ) -> np.ndarray:
-        """The formulas' value at a state: float64 (codomain, domain), computed with 50 digits.
+        """Return the formulas' value at a state: float64 (codomain, domain), computed with 50 digits.
 
-        q, v: the model's present state where left out; values: of symbols, the model's own numbers where left out.
+        q, v: default: the model's present state; values: of symbols, default: the model's own values.
         """
         import mpmath
         import sympy
@@ -300,7 +300,7 @@ class ClosedForms:
         return np.array(entries, dtype=float).reshape(formula.shape if isinstance(formula, sympy.MatrixBase) else ())
 
     def block(self, expression: Any, row: str, column: str) -> Any:
-        """The block of an operator expression in the row and column of these labels: body, hinge or node names."""
+        """Return the block of an operator expression in the row and column of these labels: body, hinge or node names."""
         if isinstance(expression, str):
             expression = getattr(self.model.soa, expression)
         made = self.evaluate(expression)

@@ -1,4 +1,4 @@
-"""From an operator expression to the sparse matrix of its closed form: one walk over the expression."""
+"""Convert an operator expression to the sparse matrix of its closed form, in one walk over the expression."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from .sparse_letters import Letters
 
 def _require_unbound(e: Any, binding: Any) -> None:
     if binding is not None:
-        raise _core.EvaluationError(f"{e.text()} is bound to a state; closed forms are of expressions without .at(q)")
+        raise _core.EvaluationError(f"{e.text()} is bound to a state; closed forms need expressions without .at(q)")
 
 
 class Evaluation:
-    """One walk over an expression. An I without a space is a number until it meets a matrix.
+    """One walk over an expression. An I without a space is a scalar until it meets a matrix.
 
     Parameters
     ----------
     letters : of the mechanism
-    field : that the entries are taken from; `.field` is what it grew to, by the symbols and roots that were met
+    field : the field of the entries; `.field` is its extension by the symbols and roots of the expression
     given : entries of vectors and constants by name
-    sample : numbers for all symbols, at which the sign of a root is looked at
+    sample : values of all symbols, for the sign of a root
     """
 
     def __init__(self, letters: Letters, field: Rationals, given: Mapping[str, Any], sample: Callable[[], dict[Any, float]]):
@@ -36,7 +36,7 @@ class Evaluation:
         self._known: dict[Any, Any] = {}
 
     def of(self, e: Any) -> Any:
-        """The matrix of an expression; of one without a space, the factor before I."""
+        """Return the matrix of an expression; for one without a space, the factor before I."""
         if e not in self._known:
             self._known[e] = getattr(self, f"_{e.kind}", self._unknown)(e)
         return self._known[e]
@@ -45,7 +45,7 @@ class Evaluation:
         raise _core.EvaluationError(f"{e.text()}: an expression of kind {e.kind!r} has no closed form here")
 
     def _children(self, e: Any) -> list[Any]:
-        """The children's matrices over one field."""
+        """Return the children's matrices over one field."""
         made = [self.of(c) for c in e.children]
         field = self.field
         return [x if c.domain is None else x.lifted(field) for x, c in zip(made, e.children, strict=True)]
@@ -56,7 +56,7 @@ class Evaluation:
         return self._letters(e.name, e.letter.arguments)
 
     def _function(self, e: Any) -> Matrix:
-        """Block functions, which derivatives bring up: crm, crf, mcross of a vector, the lower triangle with half its diagonal."""
+        """Return block functions that derivatives introduce: crm, crf, mcross of a vector, the lower triangle with half its diagonal."""
         (x,) = self._children(e)
         if e.letter is None:
             made = self._blockwise(e.children[0], x, lambda block: block.lower_half())
@@ -83,7 +83,7 @@ class Evaluation:
         return self._entries([[exact(x) for x in row] for row in e.dense()], e)
 
     def _entries(self, entries: Any, e: Any) -> Matrix:
-        """An array of expressions as a matrix of the expression's shape, over a field that has all its symbols."""
+        """Return an array of expressions as a matrix of the expression's shape, over a field with all its symbols."""
         rows, columns = e.shape
         listed = entries.tolist() if isinstance(entries, sympy.MatrixBase | np.ndarray) else list(entries)
         flat = [sympy.sympify(x) for row in listed for x in (row if isinstance(row, list | tuple) else [row])]
@@ -97,7 +97,7 @@ class Evaluation:
 
     # ------------------------------------------------------------------ composed
     def _number(self, x: Any, dimension: int) -> Matrix:
-        """A factor of I as a matrix."""
+        """Return a factor of I as a matrix."""
         field = self.field
         return Matrix.identity(field, dimension).scaled(field.element(x))
 
@@ -152,7 +152,7 @@ class Evaluation:
         return made
 
     def _blockwise(self, e: Any, x: Matrix, make: Callable[[Matrix], Matrix]) -> Matrix | None:
-        """make(block) of each diagonal block of an operator known to have no others; None where that is not known."""
+        """Apply make(block) to each diagonal block of an operator known to have no others; None if that is not known."""
         rows, columns = e.codomain.blocks, e.domain.blocks
         if not e.is_block_diagonal or [r[1] for r in rows] != [c[1] for c in columns]:
             return None
@@ -168,7 +168,7 @@ class Evaluation:
         return made
 
     def _cholesky(self, a: Matrix) -> Matrix:
-        """L, lower triangular, with A = LL*: columns of the Schur complements over the roots of their pivots."""
+        """Return L, lower triangular, with A = LL*: columns of the Schur complements over the roots of their pivots."""
         n, sample, columns = len(a.rows), self._sample(), []
         for j in range(n):
             pivot = a.rows[j].get(j)

@@ -1,4 +1,4 @@
-"""Masses, lengths, ... of a model as exact numbers or as symbols: what closed forms are made of."""
+"""Masses, lengths, ... of a model as exact numbers or as symbols, for closed forms."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ class Parameters:
 
     Parameters
     ----------
-    description : as `Multibody.description()` gives it
-    given : "numeric": exact numbers; "symbolic": a symbol for whatever is not zero (m1, l1, I1zz, ...); or a mapping with the keys
-        (body, "mass" | "com" | "inertia" | "position" | "rotation" | "rotor_inertia" | "pitch"), (node, "position") and "gravity" to
-        expressions, names of symbols, or arrays of them; what it does not list stays a number
+    description : from `Multibody.description()`
+    given : "numeric": exact numbers; "symbolic": a symbol for every nonzero value (m1, l1, I1zz, ...); or a mapping with the keys (body,
+        "mass" | "com" | "inertia" | "position" | "rotation" | "rotor_inertia" | "pitch"), (node, "position") and "gravity" to expressions,
+        names of symbols, or arrays of them; all others stay numeric
 
     Attributes
     ----------
-    bodies, nodes, gravity : the description again, its numbers as SymPy expressions
-    values : the model's own number for every symbol for which it is known
+    bodies, nodes, gravity : the description with its numbers as SymPy expressions
+    values : the model's own value of every symbol, if known
     """
 
     def __init__(self, description: Mapping[str, Any], given: str | Mapping[Any, Any] = "numeric"):
@@ -37,7 +37,7 @@ class Parameters:
                 f"parameters={given!r}: there are 'numeric', 'symbolic', or a mapping such as {{('upper', 'mass'): 'm1'}}"
             )
         self.values: dict[sympy.Symbol, float] = {}
-        self._pairs: list[tuple[sympy.Expr, float]] = []  # an expression, and the number that it stands for
+        self._pairs: list[tuple[sympy.Expr, float]] = []  # an expression, and its value
         self.bodies = [_exact_body(body) for body in description["bodies"]]
         self.nodes = [
             {"name": n["name"], "body": n["body"], "rotation": _turned(n["rotation"]), "position": _all(n["position"])}
@@ -51,7 +51,7 @@ class Parameters:
         self._solve_for_values()
 
     def expressions(self) -> list[sympy.Expr]:
-        """Every entry."""
+        """Return every entry."""
         found: list[sympy.Expr] = list(self.gravity)
         for body in self.bodies:
             for key in _OF_BODY:
@@ -63,7 +63,7 @@ class Parameters:
             found += [*_flat(node["rotation"]), *node["position"]]
         return found
 
-    # ------------------------------------------------------------------ what a user gives
+    # ------------------------------------------------------------------ values of a user
     def _substitute(self, description: Mapping[str, Any], given: Mapping[Any, Any]) -> None:
         bodies = {b["name"]: k for k, b in enumerate(description["bodies"])}
         hinges = {b["hinge"]["name"]: k for k, b in enumerate(description["bodies"])}
@@ -95,13 +95,13 @@ class Parameters:
                 self.bodies[k][quantity] = self._taken(value, number, what, quantity in _POSITIVE)
 
     def _taken(self, value: Any, number: Any, what: str, positive: bool) -> Any:
-        """The expressions of a value, of the same shape as the number; a scalar stands for an array of one."""
+        """Return the expressions of a value, in the shape of the number; a scalar stands for an array of one."""
         entries = np.asarray(value.tolist() if isinstance(value, sympy.MatrixBase) else value, dtype=object)
         numbers = np.asarray(number, float)
         if entries.shape != numbers.shape and entries.size == numbers.size == 1:
             entries = entries.reshape(numbers.shape)
         if entries.shape != numbers.shape:
-            raise _core.ModelError(f"{what}: an array {numbers.shape} is asked for, not {entries.shape}")
+            raise _core.ModelError(f"{what}: an array {numbers.shape} is needed, not {entries.shape}")
         made = np.empty(entries.shape, dtype=object)
         for i in np.ndindex(*entries.shape):
             made[i] = self._one(entries[i], float(numbers[i]), positive and (len(i) < 2 or i[0] == i[1]))
@@ -112,18 +112,18 @@ class Parameters:
             return -self._one(entry[1:], -number, positive)
         if isinstance(entry, str):
             if not entry.isidentifier():
-                raise _core.ModelError(f"{entry!r} is no name of a parameter; write formulas as SymPy expressions")
+                raise _core.ModelError(f"{entry!r} is not a name of a parameter; write formulas as SymPy expressions")
             entry = sympy.Symbol(entry, real=True, positive=True if positive and number > 0 else None)
         if isinstance(entry, float | np.floating):
             return exact(float(entry))
         expression = sympy.sympify(entry)
         if not isinstance(expression, sympy.Expr):
-            raise _core.ModelError(f"{entry!r} is no number, name or SymPy expression")
+            raise _core.ModelError(f"{entry!r} is not a number, name or SymPy expression")
         if expression.free_symbols:
             self._pairs.append((expression, number))
         return expression
 
-    # ------------------------------------------------------------------ a symbol for everything
+    # ------------------------------------------------------------------ symbols for all parameters
     def _name_everything(self, description: Mapping[str, Any]) -> None:
         rods: dict[int, sympy.Symbol] = {}
         for k, body in enumerate(description["bodies"]):
@@ -166,7 +166,7 @@ class Parameters:
         return self._one(name, float(number), positive) if number else sympy.S.Zero
 
     def _placed(self, name: str, position: Sequence[float], parent: int, description: Mapping[str, Any], rods: Mapping[int, sympy.Symbol]):
-        """A position on a body: at the end of a rod that is the rod's length."""
+        """Return a position on a body: at the end of a rod it is the rod's length."""
         if parent in rods:
             length = rod_length(description["bodies"][parent])
             if length is not None and abs(position[0] - length) <= 1e-12 * length and not np.any(position[1:]):
@@ -174,7 +174,7 @@ class Parameters:
         return [self._unless_zero(f"{name}{x}", c) for x, c in zip("xyz", position, strict=True)]
 
     def _solve_for_values(self) -> None:
-        """The model's numbers of the symbols, from the entries that they stand in."""
+        """Solve for the model's values of the symbols, from the entries that contain them."""
         waiting = self._pairs
         while True:
             left = []
@@ -200,7 +200,7 @@ class Parameters:
 
 
 def rod_length(body: Mapping[str, Any]) -> float | None:
-    """The length of a uniform thin rod along x from the body frame's origin, or None for a body that is none."""
+    """Return the length of a uniform thin rod along x from the body frame's origin, or None for any other body."""
     m, c, inertia = body["mass"], np.asarray(body["com"]), np.asarray(body["inertia"])
     if m <= 0 or c[0] <= 0 or np.any(c[1:]):
         return None
@@ -245,7 +245,7 @@ def _all(numbers: Iterable[float]) -> list[sympy.Expr]:
 
 
 def _turned(rotation: Any) -> list[list[sympy.Expr]]:
-    """A rotation matrix: what is within a rounding of 0 and ±1 is that, as cos(π/2) is zero."""
+    """Return a rotation matrix with entries within a rounding of 0 and ±1 made exact, as cos(π/2) is zero."""
     return [_direction(row) for row in np.asarray(rotation, float)]
 
 

@@ -1,4 +1,4 @@
-"""Sparse matrices of rational functions (`rational`), with exact elimination: what closed forms are computed with."""
+"""Sparse matrices of rational functions (`rational`), with exact elimination, for closed forms."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class Matrix:
     def __init__(self, field: Rationals, rows: list[dict[int, Any]], columns: int):
         self.field, self.rows, self.columns = field, rows, columns
 
-    # ------------------------------------------------------------------ making them
+    # ------------------------------------------------------------------ construction
     @classmethod
     def of(cls, field: Rationals, entries: Sequence[Sequence[Any]], columns: int | None = None) -> Matrix:
-        """A matrix of SymPy expressions or numbers, given row by row."""
+        """Return a matrix of SymPy expressions or numbers, given row by row."""
         rows = [{j: x for j, e in enumerate(row) if (x := field.element(e))} for row in entries]
         return cls(field, rows, len(entries[0]) if columns is None else columns)
 
@@ -34,7 +34,7 @@ class Matrix:
 
     @classmethod
     def diagonal(cls, field: Rationals, blocks: Sequence[Matrix]) -> Matrix:
-        """Block diagonal of the given blocks."""
+        """Return the block diagonal of the given blocks."""
         rows: list[dict[int, Any]] = []
         at = 0
         for block in blocks:
@@ -43,7 +43,7 @@ class Matrix:
         return cls(field, rows, at)
 
     def lifted(self, field: Rationals) -> Matrix:
-        """The same matrix over a field that extends this one."""
+        """Return the same matrix over a field that extends this one."""
         if field is self.field:
             return self
         return Matrix(field, [{j: field.lift(x) for j, x in row.items()} for row in self.rows], self.columns)
@@ -108,7 +108,7 @@ class Matrix:
     __hash__ = None  # type: ignore[assignment]  # how Python spells unhashable
 
     def eliminated(self, right: Matrix) -> tuple[Matrix, Any]:
-        """A⁻¹B and det A, by Gauss and Jordan on entries reduced at every step.
+        """Return A⁻¹B and det A, by Gauss-Jordan elimination with entries reduced at every step.
 
         The pivot is the shortest nonzero entry of its column. Raises ArithmeticError for a matrix that is singular at every state.
         """
@@ -145,7 +145,7 @@ class Matrix:
         return Matrix(self.field, made, right.columns), determinant
 
     def inverse(self) -> Matrix:
-        """By cofactors up to (3, 3), which divide once; by elimination above."""
+        """Return the inverse by cofactors up to (3, 3), which divide once; by elimination above."""
         if len(self.rows) <= 3:
             return self._by_cofactors()
         return self.eliminated(Matrix.identity(self.field, len(self.rows)))[0]
@@ -167,14 +167,14 @@ class Matrix:
         return Matrix(field, transposed, n)
 
     def determinant(self) -> Any:
-        """Zero for a singular matrix."""
+        """Return the determinant, zero for a singular matrix."""
         try:
             return self.eliminated(Matrix.zeros(self.field, len(self.rows), 0))[1]
         except _core.SingularOperatorError:
             return self.field.zero
 
     def lower_half(self) -> Matrix:
-        """The lower triangle with half the diagonal."""
+        """Return the lower triangle with half the diagonal."""
         half = self.field.one / 2
         rows = [{j: self.field.reduce(half * x) if j == i else x for j, x in row.items() if j <= i} for i, row in enumerate(self.rows)]
         return Matrix(self.field, rows, self.columns)
@@ -186,7 +186,7 @@ class Matrix:
         return total
 
     def sympy(self, simplify: bool = True) -> sympy.ImmutableDenseMatrix:
-        """The matrix as SymPy shows it."""
+        """Return the matrix as a SymPy matrix."""
         entries = {(i, j): self.field.expression(x, simplify) for i, row in enumerate(self.rows) for j, x in row.items()}
         return sympy.ImmutableDenseMatrix(sympy.SparseMatrix(len(self.rows), self.columns, entries))
 

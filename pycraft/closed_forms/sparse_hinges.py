@@ -24,9 +24,9 @@ class Hinges:
 
     Attributes
     ----------
-    field : what entries are taken from: rational functions of sines and cosines, the other coordinates, velocities and parameters
+    field : the field of the entries: rational functions of sines and cosines, the other coordinates, velocities and parameters
     poses : of each body in its parent
-    rows : of H, for each body those of each subhinge, in the body's frame
+    rows : rows of H, for each body those of each subhinge, in the body's frame
     steps : for each body the pose of the frame after each subhinge in the frame before it
     """
 
@@ -42,7 +42,7 @@ class Hinges:
         return Matrix.of(self.field, entries, columns)
 
     def _subhinges(self) -> list[tuple[dict[str, Any], list[sympy.Symbol]]]:
-        """Every subhinge with its coordinates."""
+        """Return every subhinge with its coordinates."""
         at, found = 0, []
         for body in self._parameters.bodies:
             for s in body["subhinges"]:
@@ -55,7 +55,7 @@ class Hinges:
         return [q[at : at + 4] for at, q in starts if at is not None]
 
     def _atoms(self) -> list[sympy.Expr]:
-        """What entries are rational in: sines and cosines of angles, the other coordinates."""
+        """Return the generators of the entries: sines and cosines of angles, the other coordinates."""
         atoms: list[sympy.Expr] = []
         for s, q in self._subhinges():
             if KINDS[s["kind"]].angle:
@@ -65,7 +65,7 @@ class Hinges:
         return atoms
 
     def rates(self) -> Matrix:
-        """Γ, (nq, nv): q̇ = Γ(q)θ̇. Ball: ½ q⊗(0, ω); free: that, and R(q) on the linear velocity."""
+        """Return Γ, (nq, nv): q̇ = Γ(q)θ̇. Ball: ½ q⊗(0, ω); free: the same, and R(q) on the linear velocity."""
         blocks = []
         half = sympy.Rational(1, 2)
         for s, q in self._subhinges():
@@ -83,7 +83,7 @@ class Hinges:
         return self._matrix([[x] for x in s["axis"]], 1), self._matrix([[x] for x in s["point"]], 1)
 
     def _step(self, s: dict[str, Any], q: Sequence[sympy.Symbol]) -> Pose:
-        """Pose of the frame after a subhinge in the frame before it. A rotation about a: cos q I + sin q ã + (1 − cos q) aa*."""
+        """Return the pose of the frame after a subhinge in the frame before it. A rotation about a: cos q I + sin q ã + (1 − cos q) aa*."""
         kind, one = s["kind"], Matrix.identity(self.field, 3)
         a, c = self._axis_and_point(s)
         if kind == "slider":
@@ -99,7 +99,8 @@ class Hinges:
         return R, c - R @ c + a.scaled(travel)
 
     def _rows(self, s: dict[str, Any]) -> Matrix:
-        """Rows of H of one subhinge, in the frame after it: pin (a; c×a), slider (0; a), screw (a; c×a + pitch a), ball (e_i; c×e_i)."""
+        """Return the rows of H of one subhinge, in the frame after it: pin (a; c×a), slider (0; a), screw (a; c×a + pitch a), ball (e_i;
+        c×e_i)."""
         a, c = self._axis_and_point(s)
         if s["kind"] == "free":
             return Matrix.identity(self.field, 6)
@@ -114,7 +115,7 @@ class Hinges:
         return made.T
 
     def _kinematics(self) -> None:
-        """Body by body: the poses of its subhinges' frames, of itself in its parent, and the rows of H, carried to its frame."""
+        """Compute body by body: the poses of its subhinges' frames, its pose in its parent, and the rows of H in its frame."""
         placed = iter(self._subhinges())
         for body in self._parameters.bodies:
             steps = [self._step(s, q) for s, q in islice(placed, len(body["subhinges"]))]

@@ -20,13 +20,13 @@ from .sparse_spatial import Pose, composed, crf, crm, force_transform, in_blocks
 
 
 class Letters:
-    """The letters of a tree of rigid bodies at symbols q and v. Each is computed when first asked for.
+    """The letters of a tree of rigid bodies at symbols q and v. Each is computed on first use.
 
     Parameters
     ----------
     parameters : of the model
     q, v : symbols of the coordinates and velocities
-    unit : quaternions taken as of unit length; otherwise as q/|q|
+    unit : assume unit quaternions; otherwise q/|q|
     """
 
     def __init__(self, parameters: Parameters, q: Sequence[sympy.Symbol], v: Sequence[sympy.Symbol], unit: bool):
@@ -44,7 +44,7 @@ class Letters:
 
     # ------------------------------------------------------------------ letters
     def __call__(self, name: str, of: tuple[Any, ...] = ()) -> Matrix:
-        """A letter by its ASCII name, and what it is of as `Letter.arguments` has it."""
+        """Return a letter by its ASCII name, and its arguments as in `Letter.arguments`."""
         if (name, of) not in self._made:
             if name not in LETTERS:
                 raise _core.EvaluationError(f"the letter {name!r} has no closed form here")
@@ -59,7 +59,7 @@ class Letters:
         return Matrix.diagonal(self.field, list(blocks))
 
     def _each(self, make: Callable[[Matrix], Matrix], x: Matrix) -> Matrix:
-        """Block diagonal of make(x(k))."""
+        """Return the block diagonal of make(x(k))."""
         return Matrix.diagonal(x.field, [make(x.block(s, slice(0, 1))) for s in self.states])
 
     def _identity(self) -> Matrix:
@@ -73,7 +73,7 @@ class Letters:
         return made
 
     def _resolvent(self, name: str) -> Matrix:
-        """(I − E)⁻¹, block by block along the paths to the base: column k is e_k + E's column k in the parent's column."""
+        """Return (I − E)⁻¹, block by block along the paths to the base: column k is e_k + E's column k in the parent's column."""
         E, made = self(name), self._identity()
         for k, p in enumerate(self.parents):
             if p >= 0:
@@ -82,12 +82,12 @@ class Letters:
         return made
 
     def _stacked(self, k: int) -> Matrix:
-        """H(k)."""
+        """Return H(k)."""
         rows = [row for part in self.hinges.rows[k] for row in part.rows]
         return Matrix(self.field, rows, 6)
 
     def _inertia(self, k: int) -> Matrix:
-        """M(k): [[𝓘 − m c̃c̃, m c̃], [−m c̃, m I]]."""
+        """Return M(k): [[𝓘 − m c̃c̃, m c̃], [−m c̃, m I]]."""
         body = self.parameters.bodies[k]
         c, m = skew(self._matrix([[x] for x in body["com"]], 1)), self.field.element(body["mass"])
         first = c.scaled(m)
@@ -98,7 +98,7 @@ class Letters:
         return self._diagonal([self._matrix([[r]]) for r in rotors])
 
     def _carried(self, E: Matrix, inertias: Matrix, k: int) -> Matrix:
-        """Σ over the children c of body k: E(k,c) X(c) E*(k,c)."""
+        """Return Σ over the children c of body k: E(k,c) X(c) E*(k,c)."""
         total = Matrix.zeros(self.field, 6, 6)
         for c, p in enumerate(self.parents):
             if p == k:
@@ -130,7 +130,7 @@ class Letters:
             except _core.SingularOperatorError:
                 body = self.parameters.bodies[k]
                 raise _core.SingularHingeError(
-                    f"D is singular at hinge '{body['hinge']}' of body '{body['name']}': some motion of it meets no inertia, at any state"
+                    f"D is singular at hinge '{body['hinge']}' of body '{body['name']}': some motion of it feels no inertia at any state"
                 ) from None
             gain = force @ inverted
             for made, row, column, block in (
@@ -177,7 +177,7 @@ class Letters:
         return (B.T @ self("Omega") @ B).inverse()
 
     def _twist(self, of: tuple[Any, ...]) -> Matrix:
-        """h, stacked: the twist of a coordinate, or component c in the axes before subhinge p of body k; in the body's axes."""
+        """Return h, stacked: the twist of a coordinate, or component c in the axes before subhinge p of body k; in the body's axes."""
         if of[0] == "coordinate":
             return self("H").T.block(slice(0, 6 * len(self.parents)), slice(of[1], of[1] + 1))
         _, k, position, component = of
@@ -192,7 +192,7 @@ class Letters:
         return self._each(crf, self("h", of))
 
     def _Pi(self, of: tuple[Any, ...]) -> Matrix:
-        """Π: ones at one coordinate, or at those of subhinges first to last of hinge k (-1: of all)."""
+        """Return Π: ones at one coordinate, or at those of subhinges first to last of hinge k (-1: of all)."""
         chosen = [of[1]]
         if of[0] == "subhinges":
             _, body, first, last = of
@@ -205,7 +205,7 @@ class Letters:
         return Matrix(self.field, rows, len(self.v))
 
     def _dM(self, of: tuple[Any, ...]) -> Matrix:
-        """∂M by mass, centre of mass (3) and inertia (xx xy xz yy yz zz) of one body, one after the other."""
+        """Return ∂M by mass, centre of mass (3) and inertia (xx xy xz yy yz zz) of one body, one after the other."""
         _, k, *parameters = of
         m, *c = sympy.symbols("m c:3", cls=sympy.Dummy)
         inertia = sympy.symbols("i:6", cls=sympy.Dummy)
@@ -224,14 +224,14 @@ class Letters:
         return made
 
     def function(self, name: str, x: Matrix) -> Matrix:
-        """crm, crf or mcross of every body's part of a stacked vector."""
+        """Return crm, crf or mcross of every body's part of a stacked vector."""
         makers = {"crm": crm, "crf": crf, "mcross": momentum_cross}
         if name not in makers:
             raise _core.EvaluationError(f"the function {name!r} has no closed form here")
         return self._each(makers[name], x)
 
     def _rotor_forces(self) -> Matrix:
-        """θ̇ ×* (Jθ̇): by subhinges ω̃ of a ball's rates, crf of a free one's, zero of one coordinate."""
+        """Return θ̇ ×* (Jθ̇): by subhinges ω̃ of a ball's rates, crf of a free one's, zero of one coordinate."""
         x, at = self("theta_dot"), 0
         blocks = []
         for kind in (KINDS[s["kind"]] for b in self.parameters.bodies for s in b["subhinges"]):
@@ -266,7 +266,7 @@ class Letters:
         return own if self.parents[k] < 0 else composed(self._world(self.parents[k]), own)
 
     def _field_of_gravity(self, roots_only: bool) -> Matrix:
-        """φ*(0,k)(0; g) at every body; at the roots alone and negative, the base's acceleration."""
+        """Return φ*(0,k)(0; g) at every body; at the roots alone and negative, the base's acceleration."""
         g = self._matrix([[0], [0], [0], *[[x] for x in self.parameters.gravity]], 1)
         rows: list[dict[int, Any]] = []
         for k, p in enumerate(self.parents):
@@ -317,7 +317,7 @@ LETTERS: dict[str, Callable[..., Matrix]] = {
     "X_world": lambda o: o._diagonal([force_transform(o._world(k)) for k in range(len(o.parents))]),
     "gravity_field": lambda o: o._field_of_gravity(False),
     "gravity_base": lambda o: o._field_of_gravity(True),
-    # What is asked for so often that it has a name: ℳ as typed, the equations of motion's mass matrix, its inverse, bias forces.
+    # Frequent expressions with names: ℳ as typed, the equations of motion's mass matrix, its inverse, bias forces.
     "MM": lambda o: o("H") @ o("phi") @ o("M") @ o("phi").T @ o("H").T,
     "mass_matrix": lambda o: o("MM") + o("J"),
     "innovations": lambda o: Matrix.identity(o.field, len(o.v)) - o("H") @ o("psi") @ o("K"),

@@ -1,1 +1,1 @@
-"""The direct calls: dynamics, sensitivities, Jacobians and trajectories of a model, numbers without algebra."""
+"""The direct calls: dynamics, sensitivities, Jacobians and trajectories of a model, values without algebra."""

@@ -1,4 +1,4 @@
-"""Forward dynamics by the formula of the equations of motion as typed: every operator realized, the mass matrix eliminated."""
+"""Forward dynamics by the equations of motion as typed: every operator realized, the mass matrix eliminated."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..arguments import first_not_finite
 
 
 def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarray:
-    """Accelerations (nv,) or (B, nv) as (HφMφ*H* + J)⁻¹ (T - Hφ(Mφ*(a + a₀) + b)) evaluated as typed, no theorem used.
+    """Return accelerations (nv,) or (B, nv) as (HφMφ*H* + J)⁻¹ (T - Hφ(Mφ*(a + a₀) + b)) evaluated as typed, without theorems.
 
-    Equations of motion [Jain 2011, forward dynamics by the mass matrix], realized and eliminated: O(N³). T is less what rotors of balls and
-    free hinges take, v ×* (J v). Takes and refuses what the other direct calls do; an error at one state of a batch says which.
+    Equations of motion [Jain 2011, forward dynamics by the mass matrix], realized and eliminated: O(N³). T excludes the rotor forces v ×*
+    (J v) of balls and free hinges. Accepts and refuses the same arguments as the other direct calls; an error in a batch names the state.
     """
     q, v, tau, batch = motion_state(model, q, v, tau)
     result = output(out, (*batch, model.nv))  # filled at the end: it may lie in the memory of q, v or tau
@@ -35,9 +35,9 @@ def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarr
 
 
 def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, ...]]:
-    """q (nq,), v (nv,), tau (nv,), or (B, ...) all three where one of them is, as arrays, and the shape of the batch: () or (B,).
+    """Return q (nq,), v (nv,), tau (nv,), or (B, ...) all three if one of them is a batch, as arrays, and the batch shape: () or (B,).
 
-    What is of one state is repeated for a batch: operators at one q would take v (nv, nv) for so many columns.
+    Arguments of one state are repeated for a batch: operators at one q would read v (nv, nv) as that many columns.
 
     Raises ModelError, in the words of the core's direct calls, for wrong shapes, batches that differ and entries that are not finite.
     """
@@ -53,7 +53,7 @@ def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.n
 
 
 def checked_forces(model: Any, tau: Any, name: str = "tau") -> np.ndarray:
-    """Generalized forces or accelerations (nv,) or (B, nv) as an array; a ModelError names what is wrong with them."""
+    """Return generalized forces or accelerations (nv,) or (B, nv) as an array; a ModelError names the fault."""
     nv = model.nv
     forces = _core.real_array(tau, name)
     if forces.ndim not in (1, 2) or forces.shape[-1] != nv:
@@ -66,7 +66,7 @@ def checked_forces(model: Any, tau: Any, name: str = "tau") -> np.ndarray:
 
 
 def output(out: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """The array that a result is written to: `out` where it fits, a new one where it is None."""
+    """Return the array for a result: `out` if it fits, a new one if it is None."""
     if out is None:
         return np.empty(shape)
     fits = isinstance(out, np.ndarray) and out.dtype == np.float64 and out.flags.c_contiguous and out.flags.writeable

@@ -1,4 +1,4 @@
-"""Direct calls of what is about the centre of mass of a model, or of a part of one."""
+"""Direct calls about the centre of mass of a model, or of a part of one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class CentroidalMomentum(NamedTuple):
     """Momentum about the centre of mass in world axes, angular first.
 
     value (6,): h = matrix @ v, its linear part the mass times the velocity of the centre of mass; matrix (6, nv); matrix_dot (6, nv): the
-    matrix's rate along v, so that ḣ = matrix @ v̇ + matrix_dot @ v; dq (6, nv): ∂h/∂q at v. Leading batch axes as they were given.
+    rate of the matrix along v, so that ḣ = matrix @ v̇ + matrix_dot @ v; dq (6, nv): ∂h/∂q at v. Leading batch axes as in the arguments.
     """
 
     value: np.ndarray
@@ -29,7 +29,7 @@ class CentroidalMomentum(NamedTuple):
 class CentroidalCalls(SensitivityCalls):
     """Centre of mass, composite inertia and centroidal momentum: O(N), all bodies about the centre of mass from the start.
 
-    Each raises ModelError where no body has mass. Rotors, which turn with their hinges, have no part in these.
+    Each raises ModelError if no body has mass. Rotors, which turn with their hinges, do not contribute.
     """
 
     mass: float
@@ -43,7 +43,7 @@ class CentroidalCalls(SensitivityCalls):
 
     @over_threads
     def centre_of_mass(self, q=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """The centre of mass of all bodies in the world, (3,) or (B, 3), in metres.
+        """Return the centre of mass of all bodies in the world, (3,) or (B, 3), in metres.
 
         Examples
         --------
@@ -55,8 +55,8 @@ class CentroidalCalls(SensitivityCalls):
 
     @over_threads
     def centre_of_mass_frame(self, q=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """The pose (4, 4) or (B, 4, 4) of the frame at the centre of mass with the world's axes, in which `composite_inertia` and
-        `centroidal_momentum` are."""
+        """Return the pose (4, 4) or (B, 4, 4) of the frame at the centre of mass with the world's axes, the frame of `composite_inertia`
+        and `centroidal_momentum`."""
         centre = self._sums(q, None, precision)[..., :3]
         pose = np.zeros((*centre.shape[:-1], 4, 4))
         pose[..., range(4), range(4)] = 1
@@ -65,7 +65,7 @@ class CentroidalCalls(SensitivityCalls):
 
     @over_threads
     def centre_of_mass_velocity(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """The velocity of the centre of mass in world axes, (3,) or (B, 3), in m/s.
+        """Return the velocity of the centre of mass in world axes, (3,) or (B, 3), in m/s.
 
         Examples
         --------
@@ -77,7 +77,7 @@ class CentroidalCalls(SensitivityCalls):
 
     @over_threads
     def centre_of_mass_jacobian(self, q=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """∂ċ/∂v in world axes, (3, nv) or (B, 3, nv); along coordinates also ∂c/∂q.
+        """Return ∂ċ/∂v in world axes, (3, nv) or (B, 3, nv); along coordinates also ∂c/∂q.
 
         Examples
         --------
@@ -90,8 +90,8 @@ class CentroidalCalls(SensitivityCalls):
 
     @over_threads
     def composite_inertia(self, q=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """Spatial inertia (6, 6) or (B, 6, 6) of all bodies as one rigid body, in the frame at the centre of mass: block diagonal,
-        the rotational inertia and the mass.
+        """Return the spatial inertia (6, 6) or (B, 6, 6) of all bodies as one rigid body, in the frame at the centre of mass: block
+        diagonal, the rotational inertia and the mass.
 
         Examples
         --------
@@ -107,7 +107,8 @@ class CentroidalCalls(SensitivityCalls):
 
     @over_threads
     def centroidal_momentum(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> CentroidalMomentum:
-        """Momentum about the centre of mass, its matrix, the matrix's rate, and the derivative by q: see `CentroidalMomentum`.
+        """Return the momentum about the centre of mass, its matrix, the rate of the matrix, and the derivative by q: see
+        `CentroidalMomentum`.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""Cholesky factors of matrices of a batch, with the state at which there is none."""
+"""Cholesky factors of matrices of a batch, with the state where there is none."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .. import _core
 
 
 def cholesky(matrix: np.ndarray, called: str, without: str) -> np.ndarray:
-    """L with LL* = matrix, (..., n, n). SingularOperatorError where one is not positive definite: `called`, `without`, which state."""
+    """Return L with LL* = matrix, (..., n, n). SingularOperatorError names the state of a matrix that is not positive definite."""
     try:
         return np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:

@@ -18,9 +18,9 @@ METHODS = ("augment", "embed")
 
 
 class LoopForce(NamedTuple):
-    """What a loop puts on the two frames that it joins, the moment first, each in its frame's axes about its origin (N m, N).
+    """Spatial force of a loop on the two frames that it joins, the moment first, each in its frame's axes about its origin (N m, N).
 
-    b, a : (6,) or (B, 6); zeros of couplings, whose forces are those along their coordinates, Q*λ. Of velocities: impulses (N m s, N s).
+    b, a : (6,) or (B, 6); zeros for couplings, which act along their coordinates, Q*λ. For velocities: impulses (N m s, N s).
     """
 
     b: np.ndarray
@@ -34,11 +34,11 @@ class ConstrainedDynamics:
     Attributes
     ----------
     vdot : (nv,)
-    multipliers : (rows,) in the order of `loops.rows`: (ℳ + J) v̇ + 𝒞 = τ + Q*λ. Of a row along a direction λ is the force on b by a there
-        (N), of one about it the moment (N m).
-    by_loop : the same by the loops' names, (rows of the loop,) each
-    forces : `LoopForce` by the loops' names
-    rank : () the rank of Q that was found; rows - rank multipliers are a choice, the least Σ λ², by embedding zero of rows left out
+    multipliers : (rows,) in the order of `loops.rows`: (ℳ + J) v̇ + 𝒞 = τ + Q*λ. For a row along a direction, λ is the force on b by a in
+        that direction (N); for a row about it, the moment (N m).
+    by_loop : the same by the names of loops, (rows of the loop,) each
+    forces : `LoopForce` by the names of loops
+    rank : () the rank of Q; rows - rank multipliers are a choice, the least Σ λ², or with "embed" zero for omitted rows
     """
 
     vdot: np.ndarray
@@ -50,7 +50,7 @@ class ConstrainedDynamics:
 
 @dataclass(frozen=True)
 class ConstrainedVelocities:
-    """Velocities that keep the rows of all loops, after the impulse that takes a model there, with a leading axis for batches.
+    """Velocities that keep the rows of all loops, after the impulse that produces them, with a leading axis for batches.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class ConstrainedVelocities:
 
 
 class ConstrainedCalls:
-    """Equations of motion with the loops' forces in them."""
+    """Equations of motion including the loops' forces."""
 
     nv: int
     loops: Any
@@ -77,35 +77,35 @@ class ConstrainedCalls:
         form: str = "fast", refine: int | str = 0, residual: str = "same", precision: str = "double", alpha: float = 0.0, beta: float = 0.0,
         independent: Any = None,
     ) -> ConstrainedDynamics:  # fmt: skip
-        """Forward dynamics on the loops: v̇ that keeps every row, and the loops' forces. No mass matrix is formed.
+        """Return v̇ that keeps every row of the loops, and the loops' forces. No mass matrix is formed.
 
         (ℳ + J) v̇ + 𝒞 = τ + Q*λ,   Q v̇ + Q̇v + 2α Qv + β² r = 0,   by   Q(ℳ + J)⁻¹Q* λ = -(Q v̇_free + ...):
 
-        v̇_free and the factors of Q(ℳ + J)⁻¹Q* by the articulated bodies, of each group of loops that share hinges by itself. Dependent
-        rows are found by rank, and have the multipliers of least Σ λ²; v̇ does not hang on that choice.
+        v̇_free and the factors of Q(ℳ + J)⁻¹Q* come from the articulated bodies, separately for each group of loops that share hinges.
+        Dependent rows are found by rank, and get the multipliers of least Σ λ²; v̇ does not depend on that choice.
 
-        By "embed" the bodies around loops that hang together are one body of a tree without loops, v = X v_r, γ = Ẋv_r:
+        With "embed" the bodies around connected loops are one body of a tree without loops, v = X v_r, γ = Ẋv_r:
 
         X*(ℳ + J)X v̇_r = X*(τ - 𝒞 - (ℳ + J)γ),   v̇ = X v̇_r + γ
 
-        no multiplier is solved for, and bodies without mass are fine that move with others. λ follows from v̇: zero of rows that hang on
-        others and are left out. Singular states are refused where no coordinates describe what is free.
+        no multiplier is solved for, and bodies without mass are allowed if they move with others. λ follows from v̇, zero for omitted
+        dependent rows. Singular states are refused, since no coordinates describe their freedoms.
 
         Parameters
         ----------
-        q, v : (nq,), (nv,), each with an optional leading batch axis; states on the loops (`assemble`) where λ is to mean something
+        q, v : (nq,), (nv,), each with an optional leading batch axis; λ is meaningful only for states on the loops (`assemble`)
         tau : (nv,), N m and N; zeros by default
         wrenches, wrench_axes : as in `interbody_forces`
         method : {"augment", "embed"}
-        form : {"fast", "ud", "square-root"}, of the tree's sweep; by "embed" "fast" alone
+        form : {"fast", "ud", "square-root"}, of the tree's sweep; with "embed" only "fast"
         refine, residual : int or "auto", {"same", "wider"}
-            Steps of refinement of both equations, with residuals in the same or the next wider precision ("wider" to "extended"); by
-            "embed" the same alone.
-        precision : {"single", "double", "extended", "quad"}, of everything
+            Steps of refinement of both equations, with residuals in the same or the next wider precision ("wider" up to "extended"); with
+            "embed" only the same.
+        precision : {"single", "double", "extended", "quad"}, of the whole computation
         alpha, beta : float, 1/s
-            Baumgarte's: r̈ + 2α ṙ + β² r = 0, of rows of velocities ṙ alone; by "augment".
-        independent : names of coordinates or hinges, by "embed"
-            Around loops that hang together as many as are free, or none of them (None, an empty list): then they are chosen at each
+            Baumgarte's: r̈ + 2α ṙ + β² r = 0, for rows of velocities only ṙ; with "augment".
+        independent : names of coordinates or hinges, with "embed"
+            Around each group of connected loops as many as there are freedoms, or none (None, an empty list): then they are chosen at each
             state, by complete pivoting in units of energy.
 
         Returns
@@ -115,21 +115,23 @@ class ConstrainedCalls:
         Raises
         ------
         EvaluationError
-            Rows that ask different accelerations of one motion (at singular states, where v leaves no branch; functions that conflict), by
-            name. Results that miss a row or an equation of motion, near singular states, by name: what is returned was put into both. A
-            method that is not there, and what "embed" has not. Coordinates that are not independent at a state, with such as are.
+            Rows that require different accelerations of one motion (at singular states, where v is tangent to no branch; functions that
+            conflict), by name. Results that miss a row or an equation of motion, near singular states, by name: every result was
+            substituted into both. An unknown method, and options that "embed" does not have. Coordinates that are not independent at a
+            state, with a choice that is.
         SingularHingeError
-            As `forward_dynamics`, of the tree alone; also where a coordinate feels hardly any inertia. By "embed" of what is independent.
+            As `forward_dynamics`, for the tree alone; also if a coordinate feels hardly any inertia. With "embed", for the independent
+            coordinates.
         ModelError
-            Arrays of another shape, not finite; a loop that has lost a body; alpha or beta below zero.
+            Arrays of the wrong shape, not finite; a loop that has lost a body; alpha or beta below zero.
 
-        Rows count as dependent where in units of their own, and of energy, less than √ε of them is left beside the others (in
-        "quad" 64 ε of a double: states are doubles); a row or an equation is missed from 64 times that of its largest term on, a row also
-        in its own units. Where that happens the state is solved in the next wider precision, up to "quad", and refused if it happens there;
-        couplings by functions of a user are in double alone and refused at once.
+        Rows count as dependent if in their own units, and in units of energy, less than √ε of them is left beside the others (in "quad" 64
+        ε of a double: states are doubles). A row or an equation counts as missed from 64 times the rounding of its largest term, a row also
+        in its own units. Such a state is solved again in the next wider precision, up to "quad", and then refused; couplings by user
+        functions are in double only and refused at once.
 
-        Cost: O(N), O(depth) a row, and up to rows² · coordinates in each group; linear in loops
-        that share hinges with a few others (docs/loops.md). By "embed" O(N), and n³ of loops that hang together around n coordinates.
+        Cost: O(N), O(depth) per row, and up to rows² · coordinates in each group; linear in loops that share hinges with a few others
+        (docs/loops.md). With "embed" O(N), and n³ for connected loops around n coordinates.
         Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 and the chapter on constraint embedding; J. Baumgarte 1972.
 
         Examples
@@ -155,29 +157,29 @@ class ConstrainedCalls:
         numbers = one_number(alpha, "alpha"), one_number(beta, "beta")
         pushes = pushed(wrenches, wrench_axes)
         if method == "embed":
-            from .linear_on_loops import independent_numbers  # which imports linear models
+            from .linear_on_loops import independent_numbers  # it imports linear models
 
             _check_embedding(form, residual, *numbers)
             numbers_of = independent_numbers(self, independent) or []
             given = self.loops._core.embedded_accelerations(q, v, tau, *pushes, numbers_of, refine, precision)
             return ConstrainedDynamics(*by_loop(self.loops, *given))
         if independent is not None:
-            raise _core.EvaluationError("independent= is of method='embed'; method='augment' has no independent coordinates")
+            raise _core.EvaluationError("independent= needs method='embed'; method='augment' has no independent coordinates")
         given = self.loops._core.accelerations(q, v, tau, *pushes, form, refine, chosen(residual, "residual"), precision, *numbers)
         return ConstrainedDynamics(*by_loop(self.loops, *given))
 
     def constrained_velocities(
         self, q=None, v=None, impulse=None, *, form: str = "fast", precision: str = "double"
     ) -> ConstrainedVelocities:  # fmt: skip
-        """Velocities taken onto the rows of all loops by an impulse of the loops: what is nearest in kinetic energy, and loses least.
+        """Project velocities onto the rows of all loops by an impulse of the loops: the nearest in kinetic energy, with the least loss.
 
-        (ℳ + J)(v⁺ - v) = p + Q*λ,   Q v⁺ = 0: a plastic impact, as when loops close; rows of velocities are kept, too.
+        (ℳ + J)(v⁺ - v) = p + Q*λ, Q v⁺ = 0: a plastic impact, as when loops close; it also keeps rows of velocities.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
         impulse : (nv,), p along the coordinates, N m s and N s; zeros by default
-        form, precision : as in `constrained_dynamics`, whose factors, errors and cost these are
+        form, precision : as in `constrained_dynamics`, with the same factors, errors and cost
 
         Examples
         --------
@@ -195,17 +197,19 @@ class ConstrainedCalls:
 
 def _check_embedding(form: str, residual: str, alpha: float, beta: float) -> None:
     if text(form, "form") != "fast":
-        raise _core.EvaluationError(f"form={form!r} of method='embed': it has 'fast' alone; take method='augment', or soa.embedded()")
+        raise _core.EvaluationError(f"form={form!r} of method='embed': only 'fast' is available; use method='augment', or soa.embedded()")
     if text(residual, "residual") != "same":
         raise _core.EvaluationError(
-            f"residual={residual!r} of method='embed': it has 'same' alone; take a wider precision, or method='augment'"
+            f"residual={residual!r} of method='embed': only 'same' is available; use a wider precision, or method='augment'"
         )
     if alpha or beta:
-        raise _core.EvaluationError("alpha and beta are of method='augment': they draw states to loops; assemble(q, v) takes them there")
+        raise _core.EvaluationError(
+            "alpha and beta need method='augment', where they draw states to the loops; assemble(q, v) projects them"
+        )
 
 
 class _OfLoops(Mapping[str, Any]):
-    """What is each loop's own, by name, made when it is asked for: most callers ask for none. Classes, as results are pickled."""
+    """Results of each loop by name, computed on demand: most callers need none. A class, since results are pickled."""
 
     def __init__(self, places: Mapping[str, int]):
         self._places = places
@@ -247,6 +251,6 @@ class _Forces(_OfLoops):
 def by_loop(
     loops: Any, x: np.ndarray, multipliers: np.ndarray, forces: np.ndarray, rank: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, Mapping[str, np.ndarray], Mapping[str, LoopForce], np.ndarray]:  # fmt: skip
-    """What the core gives of all loops, and of multipliers and forces each loop's own by name."""
+    """Return the core's results for all loops, and the multipliers and forces of each loop by name."""
     places, first = loops.numbered()
     return x, multipliers, _Multipliers(places, first, multipliers), _Forces(places, forces), rank

@@ -1,4 +1,4 @@
-"""The direct calls of a model, for those who want numbers and no algebra: arrays in, arrays out."""
+"""The direct calls of a model, values without algebra: arrays in, arrays out."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .threads import over_threads
 
 
 def cached(model: Any, name: str, make: Callable[[Any], Any]) -> Any:
-    """What is made of a model at the first call and kept on it."""
+    """Return an object that is built at the first call and cached on the model."""
     if name not in model.__dict__:
         setattr(model, name, make(model))
     return getattr(model, name)
 
 
 def by_method(model: Any, method: str, q, v, tau, precision: str | int, out, threads: int) -> np.ndarray:
-    """Forward dynamics by another method than the articulated-body recursion."""
+    """Return forward dynamics by another method than the articulated-body recursion."""
     if method == "realization":
         return by_realization(model, q, v, tau, precision, out)
     return cached(model, "_methods", _core.Methods).forward_dynamics(method, q, v, tau, precision, out, threads)
@@ -34,15 +34,14 @@ def by_method(model: Any, method: str, q, v, tau, precision: str | int, out, thr
 class DirectCalls:
     """Forward and inverse dynamics, mass matrix, Jacobians, energies.
 
-    Each takes one state or a leading batch axis (B, ...), an argument of one state beside a batch standing for all. q may be a State,
-    which brings its v; without q it is the model's present state, `arm.q` and `arm.v`, as for expressions; beside an array q,
-    velocities, forces and accelerations that are left out are zero. SI units and radians. Generalized velocities of ball and free
-    hinges are in the axes of the body that the hinge moves, angular first. Results are float64, in `out` (writeable, C-ordered) where
-    one is given. `threads` shares the states of a batch out over so many threads, of a single state of a large tree its subtrees (forward
-    and inverse dynamics, bias forces, double precision), or the pieces of "divide-and-conquer"; every state has the bits that it has with
-    one.
-    Everywhere a ModelError names an argument of the wrong shape or with an entry that is not finite, and EvaluationError an unknown
-    option, and a result beyond the range of its numbers; errors at a state of a batch tell which.
+    Each takes one state or a leading batch axis (B, ...); an argument of one state beside a batch applies to all states. q may be a State,
+    which brings its v; without q the call uses the model's present state, `arm.q` and `arm.v`, as expressions do; beside an array q,
+    omitted velocities, forces and accelerations are zero. SI units and radians. Generalized velocities of ball and free hinges are in the
+    axes of the body that the hinge moves, angular first. Results are float64, in `out` (writeable, C-ordered) if given. `threads`
+    distributes the states of a batch over that many threads, for a single state of a large tree its subtrees (forward and inverse dynamics,
+    bias forces, double precision), or the pieces of "divide-and-conquer"; every state has the same bits as with one thread.
+    Every call raises a ModelError that names an argument of the wrong shape or with an entry that is not finite, and an EvaluationError for
+    an unknown option or a result that overflows; in a batch the error names the state.
     """
 
     nv: int
@@ -67,31 +66,30 @@ class DirectCalls:
         threads: int = 1,
         out=None,
     ) -> np.ndarray:
-        """Accelerations v̇ under generalized forces, gravity included: articulated-body algorithm, O(N).
+        """Return accelerations v̇ under generalized forces, gravity included: articulated-body algorithm, O(N).
 
         Parameters
         ----------
         q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis
             Coordinates (rad, m), velocities (rad/s, m/s), generalized forces (N m, N). Batches of the forms "fast" and "ud" run in packs.
         form : {"fast", "ud", "square-root"}
-            How the articulated inertia is carried: as P, as U diag(w) U*, as L L*. The factored forms keep the digits of light bodies
-            beside heavy ones; they cost about three and four times as much.
+            Representation of the articulated inertia: P, U diag(w) U*, or L L*. The factored forms keep the digits of light bodies beside
+            heavy ones; they cost about three and four times as much.
         refine : int or "auto"
-            Corrections by the residual of inverse dynamics, with gravity and Coriolis terms inside the sweep; "auto" takes them as long
-            as they shrink. A correction that may be no more than the rounding of its residual is left out.
+            Corrections by the residual of inverse dynamics, with gravity and Coriolis terms inside the sweep; "auto" applies them as long
+            as they shrink. A correction at the level of its residual's rounding is left out.
         residual : {"same", "gather", "wider"}
-            The residual of a refinement at the precision itself; with the forces gathered in the next wider one, which is where stretched
-            chains lose their digits; or all of it in the next wider one. Without refinement nothing has a residual, and this changes
-            nothing.
+            The residual of a refinement at the same precision; with the forces gathered in the next wider one, where stretched chains lose
+            their digits; or entirely in the next wider one. Ignored without refinement.
         precision : {"single", "double", "extended", "quad", 50, 100}
             The scalar of the whole computation; results are rounded to double.
         method : {"articulated", "cholesky", "ldl", "conjugate-gradients", "inverse", "divide-and-conquer", "realization"}
-            "articulated" is the O(N) recursion; "divide-and-conquer" joins pieces of the tree two by two, O(N) on a way of O(log N), in
-            threads (see docs/divide_and_conquer.md); the others solve the equations of motion by the mass matrix (see docs/accuracy.md).
-            None of them takes a form or a refinement.
+            "articulated" is the O(N) recursion; "divide-and-conquer" joins pieces of the tree in pairs, O(N) on a critical path of O(log
+            N), in threads (see docs/divide_and_conquer.md); the others solve the equations of motion by the mass matrix (see
+            docs/accuracy.md). Only "articulated" accepts a form and a refinement.
         on_singular : {"raise", "minimum-norm"}
-            What becomes of a hinge that feels no inertia: an error that names it, or the accelerations of least norm among those that
-            fit the forces best.
+            At a hinge that feels no inertia: raise an error that names it, or return the accelerations of least norm among those that fit
+            the forces best.
 
         Returns
         -------
@@ -102,9 +100,9 @@ class DirectCalls:
         SingularHingeError
             D(k) is singular at the rounding bound of the form in use.
         SingularOperatorError
-            Of the other methods: the mass matrix is not positive definite to rounding; "divide-and-conquer" has lost its digits.
+            With the other methods: the mass matrix is not positive definite to rounding; "divide-and-conquer" has lost its digits.
         RefinementError
-            The first correction is more than 0.3 of the solution, or the corrections do not shrink.
+            The first correction exceeds 0.3 of the solution, or the corrections do not shrink.
 
         Source: articulated-body forward dynamics by the operator factorization of the mass matrix [Jain 2011].
 
@@ -121,15 +119,13 @@ class DirectCalls:
             how = form, refine, chosen(residual, "residual"), precision, chosen(on_singular, "on_singular")
             return self._calls().forward_dynamics(q, v, tau, *how, out, threads)
         if not isinstance(method, str):
-            raise _core.EvaluationError(f"method={method!r}: a name, 'articulated', 'cholesky', ...")
+            raise _core.EvaluationError(f"method={method!r}: give a name, 'articulated', 'cholesky', ...")
         if form != "fast" or refine != 0 or residual != "same" or on_singular != "raise":
-            raise _core.EvaluationError(
-                f"method {method!r} has no form, no refinement and no other answer to singular hinges; those are the articulated method's"
-            )
+            raise _core.EvaluationError(f"method {method!r} takes no form=, refine=, residual= or on_singular=; only 'articulated' does")
         return by_method(self, method, q, v, tau, precision, out, threads)
 
     def prepare(self, call: str, *, batch: int | None = None, **options: Any) -> Callable[..., Any]:
-        """A direct call for loops, with its options read once: it takes arrays at their places, and `out=`.
+        """Return a direct call for use in loops, with its options read once: it takes positional arrays, and `out=`.
 
         Parameters
         ----------
@@ -137,18 +133,19 @@ class DirectCalls:
 "coriolis_matrix", "operational_space_inertia", "operational_space_compliance", "inverse_dynamics_derivatives", \
 "forward_dynamics_derivatives", "hybrid_dynamics"}
         batch : int, optional
-            Every call takes so many states, and each argument a leading axis of that length or stands for all; else one state a call.
+            Number of states in every call; each argument then has a leading axis of that length or applies to all. Default: one state per
+            call.
         options
-            As the call itself has them: form, refine, residual, precision, on_singular; frame=, a name, of what is a frame's;
-            prescribed=, names, of hybrid dynamics.
+            Options of the call itself: form, refine, residual, precision, on_singular; frame=, a name, for calls of a frame; prescribed=,
+            names, for hybrid dynamics.
 
         Returns
         -------
         callable
-            Of q, v, tau for forward dynamics and its derivatives; of q, v, vdot for inverse dynamics and its; of q, v for bias forces
-            and Coriolis matrices; of q, v, tau, vdot for hybrid dynamics; of q for the others; each but derivatives and hybrid dynamics
-            with out=. Arrays that are contiguous float64 cost least. It follows later edits of the model. ModelError for another number
-            of states, and what the call itself raises.
+            Its arguments are q, v, tau for forward dynamics and its derivatives; q, v, vdot for inverse dynamics and its derivatives; q, v
+            for bias forces and Coriolis matrices; q, v, tau, vdot for hybrid dynamics; q for the others; each except derivatives and hybrid
+            dynamics accepts out=. Contiguous float64 arrays cost least. It follows later edits of the model. It raises ModelError for a
+            different number of states, and the errors of the call itself.
 
         Examples
         --------
@@ -171,14 +168,14 @@ class DirectCalls:
         residual: str = "same",
         precision: str | int = "double",
     ) -> dict[str, Any]:
-        """Forward dynamics of one state with its corrections; arguments and errors as `forward_dynamics` has them.
+        """Return forward dynamics of one state with its corrections; arguments and errors as in `forward_dynamics`.
 
-        `value` (nv,), rad/s² and m/s²; `steps`, how many corrections were solved for; `corrections`, the largest entry of each over that
-        of the solution, or over its own where that is larger, so at most 1; `error`, None without a correction: the estimate of
-        ‖value - exact‖ / ‖value‖, 2-norms. That is the last correction, applied or left out, or the floor where it is larger: the most
-        that the rounding of velocities, poses, motions and forces in the residual can make of a correction. It may be far above the true
-        error, as where the value is better than any residual in this precision could tell; where accelerations cancel to nothing it is
-        above 1. O(N) a correction. ModelError for a batch, which has as many corrections as states.
+        `value` (nv,), rad/s² and m/s²; `steps`, the number of corrections computed; `corrections`, the largest entry of each over the
+        largest of the solution, or over its own if larger, so at most 1; `error`, None without a correction: the estimate of ‖value -
+        exact‖ / ‖value‖, 2-norms. It is the last correction, applied or left out, or the floor if that is larger: the most that the
+        rounding of velocities, poses, motions and forces in the residual can make of a correction. It may be far above the true error, for
+        instance if the value is better than any residual in this precision can tell; if accelerations cancel to nothing it exceeds 1. O(N)
+        per correction. ModelError for a batch, since each state has its own corrections.
 
         Examples
         --------
@@ -195,7 +192,7 @@ class DirectCalls:
     @direct
     @over_threads
     def inverse_dynamics(self, q=None, v=None, vdot=None, *, precision: str | int = "double", threads: int = 1, out=None) -> np.ndarray:
-        """Generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
+        """Return generalized forces (nv,) or (B, nv), N m and N, for the accelerations vdot, gravity and rotor inertia included.
 
         Newton-Euler, O(N) [Jain 2011, inverse dynamics]. In precision "single" to "quad".
         """
@@ -205,7 +202,7 @@ class DirectCalls:
     @direct
     @over_threads
     def bias_forces(self, q=None, v=None, *, precision: str | int = "double", threads: int = 1, out=None) -> np.ndarray:
-        """Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv), N m and N: inverse dynamics at zero acceleration. O(N).
+        """Return Coriolis, gyroscopic and gravity forces 𝒞 (nv,) or (B, nv), N m and N: inverse dynamics at zero acceleration. O(N).
 
         The equations of motion are ℳ(q) v̇ + 𝒞(q, v) = τ [Jain 2011]. In precision "single" to "quad".
 
@@ -222,10 +219,10 @@ class DirectCalls:
     @direct
     @over_threads
     def mass_matrix(self, q=None, *, precision: str | int = "double", threads: int = 1, out=None) -> np.ndarray:
-        """The mass matrix ℳ + J = HφMφ*H* + J of the equations of motion, full symmetric (nv, nv) or (B, nv, nv).
+        """Return the mass matrix ℳ + J = HφMφ*H* + J of the equations of motion, full symmetric (nv, nv) or (B, nv, nv).
 
-        Rotor inertia J included. kg m² between angles, kg m and kg where travels take part. Composite bodies, O(N²) [Jain 2011]. In
-        precision "single" to "quad".
+        Rotor inertia J included. kg m² between angles, kg m and kg for entries of travels. Composite bodies, O(N²) [Jain 2011]. Precisions
+        "single" to "quad".
 
         Examples
         --------
@@ -249,7 +246,7 @@ class DirectCalls:
         threads: int = 1,
         out=None,
     ) -> np.ndarray:
-        """The inverse of `mass_matrix`, full symmetric (nv, nv) or (B, nv, nv), by the innovations factors: O(N) a column.
+        """Return the inverse of `mass_matrix`, full symmetric (nv, nv) or (B, nv, nv), by the innovations factors: O(N) per column.
 
         (ℳ + J)⁻¹ = [I - HψK]* D⁻¹ [I - HψK] [Jain 2011]. Options and errors as in forward_dynamics; on_singular="minimum-norm" gives the
         pseudoinverse.
@@ -276,16 +273,16 @@ class DirectCalls:
         threads: int = 1,
         out=None,
     ) -> np.ndarray:
-        """Jacobian (6, nv) or (B, 6, nv) of the spatial velocity of a body or node, by its name: O(N).
+        """Return the Jacobian (6, nv) or (B, 6, nv) of the spatial velocity of a body or node, by its name: O(N).
 
-        J v is the velocity (angular rad/s, then linear m/s) of the frame against `relative_to`, a body or node by its name, the world
-        where left out. Axes and the point whose linear velocity it is:
+        J v is the velocity (angular rad/s, then linear m/s) of the frame relative to `relative_to`, a body or node by name, default: the
+        world. `axes` selects the axes and the point of the linear velocity:
 
         "body"     the frame's own axes, its origin
         "aligned"  the axes of `relative_to`, the frame's origin
         "world"    the axes of `relative_to`, the point of the frame that is at its origin
 
-        ModelError where no body or node has the name, EvaluationError for other axes. In precision "single" to "quad".
+        ModelError for an unknown body or node, EvaluationError for unknown axes. Precisions "single" to "quad".
 
         Examples
         --------
@@ -309,9 +306,10 @@ class DirectCalls:
     @direct
     @over_threads
     def pose(self, frame: str, q=None, *, threads: int = 1) -> np.ndarray:
-        """Pose (4, 4) or (B, 4, 4) of a body or node, by its name, in the world: its axes as columns, its origin in metres. O(N).
+        """Return the pose (4, 4) or (B, 4, 4) of a body or node, by its name, in the world: its axes as columns, its origin in metres.
+        O(N).
 
-        ModelError where no body or node has the name.
+        ModelError for an unknown body or node.
 
         Examples
         --------
@@ -323,7 +321,7 @@ class DirectCalls:
 
     @over_threads
     def kinetic_energy(self, q=None, v=None, *, threads: int = 1) -> np.ndarray:
-        """½ v·(ℳ + J)v, in joules, a number or (B,). O(N).
+        """Return ½ v·(ℳ + J)v, in joules, a number or (B,). O(N).
 
         Examples
         --------
@@ -335,10 +333,10 @@ class DirectCalls:
 
     @over_threads
     def potential_energy(self, q=None, *, datum=(0.0, 0.0, 0.0), threads: int = 1) -> np.ndarray:
-        """Energy -m g·(c - datum) in the uniform gravity field, c the centre of mass. Joules, a number or (B,).
+        """Return the energy -m g·(c - datum) in the uniform gravity field, c the centre of mass. Joules, a number or (B,).
 
-        A number or (B,). Summed outboard to inboard and rounded once, so its error is that of a double of its size. Far from the datum,
-        (3,) in the world's axes, m, differences of energies are smaller than that: take a datum near the system. O(N).
+        Summed outboard to inboard and rounded once, so that its error is the rounding of a double of its size. Far from the datum, (3,) in
+        the world's axes, m, differences of energies fall below that: choose a datum near the system. O(N).
 
         Examples
         --------

@@ -1,6 +1,6 @@
-"""Displacements on the group that configurations are on: brackets, and the exponential to second order.
+"""Displacements on the group of configurations: brackets, and the exponential to second order.
 
-Ball and free subhinges turn; displacements along all others are numbers, whose brackets are zero.
+Ball and free subhinges turn; displacements along all others are scalars, with zero brackets.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .. import _core
 
 
 def turning(model: Any) -> list[slice]:
-    """Where the coordinates of ball (3) and free (6) subhinges stand in v."""
+    """Return the slices of v with the coordinates of ball (3) and free (6) subhinges."""
     found, at = [], 0
     for hinge in model.hinges.values():
         for subhinge in hinge.subhinges:
@@ -26,7 +26,7 @@ def turning(model: Any) -> list[slice]:
 
 
 def brackets(turns: Sequence[slice], v: np.ndarray) -> np.ndarray:
-    """ad(v) (..., nv, nv): the brackets of the twists of ball and free subhinges, at `turns`, with v's; zero elsewhere."""
+    """Return ad(v) (..., nv, nv): the brackets of the twists of ball and free subhinges, at `turns`, with those in v; zero elsewhere."""
     out = np.zeros((*v.shape, v.shape[-1]))
     for of in turns:
         out[..., of, of] = _bracket(v[..., of])
@@ -34,7 +34,7 @@ def brackets(turns: Sequence[slice], v: np.ndarray) -> np.ndarray:
 
 
 def cobrackets(turns: Sequence[slice], costate: np.ndarray) -> np.ndarray:
-    """C (..., nv, nv) with x*C y = costate*[x, y]: skew, -[[n~, f~], [f~, 0]] on free hinges, -n~ on balls."""
+    """Return C (..., nv, nv) with x*C y = costate*[x, y]: skew, -[[n~, f~], [f~, 0]] on free hinges, -n~ on balls."""
     out = np.zeros((*costate.shape, costate.shape[-1]))
     for of in turns:
         moment, at = _skew(costate[..., of][..., :3]), of.start
@@ -46,7 +46,7 @@ def cobrackets(turns: Sequence[slice], costate: np.ndarray) -> np.ndarray:
 
 
 def _bracket(v: np.ndarray) -> np.ndarray:
-    """ad(v) of one ball (..., 3, 3) or free (..., 6, 6) subhinge."""
+    """Return ad(v) of one ball (..., 3, 3) or free (..., 6, 6) subhinge."""
     angular = _skew(v[..., :3])
     if v.shape[-1] == 3:
         return angular
@@ -61,16 +61,16 @@ def _skew(x: np.ndarray) -> np.ndarray:
 
 
 def displaced(model: Any, q: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """q exp(u) of each of a batch of states, (B, nq)."""
+    """Return q exp(u) of each state of a batch, (B, nq)."""
     return np.reshape([model.integrate(*one) for one in zip(q, u, strict=True)], q.shape)
 
 
 class Moved:
-    """q exp(u) of a displaced q and another u, as a displacement from q exp(u) of what they are here, to second order.
+    """q exp(u) after displacements of q and u, as a displacement from q exp(u) at the present q and u, to second order.
 
         log(exp(-u) exp(δ) exp(u + η)) = Ad δ + J η + ½ [Ad δ, J η] + ½ J'(η) η,    Ad = exp(-ad u), J = φ₁(-ad u), φ₁(x) = (eˣ - 1)/x
 
-    J is the exponential's differential in the axes after the motion, J' its derivative along η. Where nothing turns both are identities.
+    J is the exponential's differential in the axes after the motion, J' its derivative along η. Both are identities if nothing turns.
     Source: the Baker-Campbell-Hausdorff formula; A. Iserles and others, Lie-group methods, Acta Numerica 9 (2000).
 
     Attributes
@@ -90,7 +90,8 @@ class Moved:
             self.adjoint[..., of, of], self.differential[..., of, of] = both[..., :n, :n], both[..., :n, n:]
 
     def curvature(self, costate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Second derivatives of costate*(what is above), costate (..., m, nv): along δ and η, and along η and η, (..., m, nv, nv)."""
+        """Return second derivatives of costate*(the displacement above), costate (..., m, nv): along δ and η, and along η and η, (..., m,
+        nv, nv)."""
         from scipy.linalg import expm
 
         ad, differential = self.adjoint[..., None, :, :], self.differential[..., None, :, :]
@@ -108,6 +109,6 @@ class Moved:
 
 
 def _beside_one(A: np.ndarray) -> np.ndarray:
-    """[[A, 1], [0, 0]]"""
+    """Return [[A, 1], [0, 0]]."""
     ones = np.broadcast_to(np.eye(A.shape[-1]), A.shape)
     return np.block([[A, ones], [np.zeros_like(A), np.zeros_like(A)]])

@@ -1,4 +1,4 @@
-"""Motions of models on their loops by independent coordinates, which are chosen anew where they degrade (docs/loops.md)."""
+"""Motions of models on their loops by independent coordinates, which are replaced where they degrade (docs/loops.md)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..state import at_state
 from .embedding import EmbeddedDynamics
 
 INTEGRATORS = ("DOP853", "RK45", "RK23", "Radau", "BDF")
-_WORST, _GOOD = 10.0, 2.0  # entries of X_r in units of energy: where a choice is given up, and what a new one is brought below
+_WORST, _GOOD = 10.0, 2.0  # entries of X_r in units of energy: bound at which a choice is given up, and bound of a new one
 _NEWTON = 20
 _LEAST_RTOL = 100 * np.finfo(float).eps  # SciPy's
-_STEP = 2.0**-26  # √ε: rounding and second derivatives are of one size
+_STEP = 2.0**-26  # √ε: rounding and second derivatives contribute equally
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class EmbeddedMotion:
     ----------
     times : (T,) s
     q, v : (T, nq), (T, nv), on the loops to rounding at every time
-    choices : the independent coordinates by name, and from which time on they were
-    evaluations : of accelerations
+    choices : the independent coordinates by name, each with the time from which they were used
+    evaluations : number of evaluations of accelerations
     """
 
     times: np.ndarray
@@ -43,31 +43,31 @@ def embedded_motion(
     model: Any, times: Any, q: Any = None, v: Any = None, tau: Any = None, *, independent: Any = None,
     integrator: str = "DOP853", rtol: float = 1e-9, atol: float = 1e-12,
 ) -> EmbeddedMotion:  # fmt: skip
-    """The motion of a model on its loops by constraint embedding, from (q, v) at times[0].
+    """Integrate the motion of a model on its loops by constraint embedding, from (q, v) at times[0].
 
-    What is integrated is independent: q_r and θ̇_r, with q̇ of θ̇ = X_r θ̇_r and θ̈_r of `embedded_accelerations`. Dependent coordinates
-    go along as a start for Newton's method on the rows, Q_d δ_d = -r: they stay on their branch, and nothing drifts.
+    The integrated coordinates are independent: q_r and θ̇_r, with q̇ of θ̇ = X_r θ̇_r and θ̈_r of `embedded_accelerations`. Dependent
+    coordinates are carried along as a start for Newton's method on the rows, Q_d δ_d = -r: they stay on their branch, without drift.
 
-    After each step X_r is looked at in units of energy, X_r[d,r] √(ℳ_dd/ℳ_rr): by as much would |det Q_d| grow were d and r exchanged.
-    Where an entry is above 10, pairs are exchanged until all are below 2 (the criterion of strong rank-revealing factors), and the
-    state goes on with θ̇_r of the new coordinates. Where a state within a step is singular or off its loops, the step is made shorter.
+    After each step X_r is checked in units of energy, X_r[d,r] √(ℳ_dd/ℳ_rr): the factor by which |det Q_d| would grow if d and r were
+    exchanged. If an entry exceeds 10, pairs are exchanged until all are below 2 (the criterion of strong rank-revealing factors), and the
+    motion continues with θ̇_r of the new coordinates. If a state within a step is singular or off its loops, the step is shortened.
 
     Parameters
     ----------
     times : (T,) s, increasing
-    q, v : (nq,), (nv,), a state on the loops; the model's present one where they are left out
-    tau : (nv,), N m or N, or a function of (t, q, v) that returns it; zero where it is left out
-    independent : as of `soa.embedded`, at first
+    q, v : (nq,), (nv,), a state on the loops; default: the model's present state
+    tau : (nv,), N m or N, or a function of (t, q, v) that returns it; default: zero
+    independent : initial choice, as in `soa.embedded`
     integrator : {"DOP853", "RK45", "RK23", "Radau", "BDF"}, SciPy's, also as "scipy:DOP853"
     rtol, atol : on the error of one step, by components of (q, θ̇_r)
 
     Raises
     ------
     ModelError, EvaluationError
-        As `embedded_accelerations` at the first state; times, tolerances or a name that are none; the time where no step is short enough,
-        and what is wrong there.
+        As `embedded_accelerations` at the first state; invalid times, tolerances or integrator name; if no step is short enough, the time
+        and the reason.
 
-    Cost: one evaluation of the embedded tree and as many of the rows as Newton takes, 1 or 2, a stage.
+    Cost: one evaluation of the embedded tree per stage, and one of the rows per Newton step, 1 or 2.
     Source: M. Gu, S. Eisenstat, Efficient algorithms for computing a strong rank-revealing QR factorization, SIAM J. Sci. Comput. 17, 1996.
 
     Examples
@@ -97,7 +97,7 @@ def embedded_motion(
     if known not in INTEGRATORS:
         raise _core.EvaluationError(f"integrator {integrator!r} of motions by embedding: there are {', '.join(INTEGRATORS)}")
     run = _Run(model, tau, independent, q)
-    run.accelerations(times[0], q, v)  # what is wrong at first is said as it is
+    run.accelerations(times[0], q, v)  # errors at the first state are raised unchanged
     return run.along(times, q, v, known, rtol, atol)
 
 
@@ -107,7 +107,7 @@ def _check_model(model: Any) -> None:
 
 
 class _Run:
-    """One motion: the choice in force, and what was chosen before."""
+    """One motion: the present choice, and earlier ones."""
 
     def __init__(self, model: Any, tau: Any, independent: Any, q: np.ndarray):
         self.model, self.evaluations = model, 0
@@ -127,7 +127,7 @@ class _Run:
     def accelerations(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         try:
             given = self.tau(t, q, v)
-        except Exception as error:  # the user's own, kept for when SciPy has let go
+        except Exception as error:  # of the user's function, raised again after SciPy returns
             self.raised = error
             raise
         tau = np.asarray(_core.real_array(given, "tau"), float)
@@ -137,7 +137,7 @@ class _Run:
         return self.dynamics.accelerations(q, v, tau) if self.model.nv else np.zeros(0)
 
     def onto_loops(self, q: np.ndarray) -> np.ndarray:
-        """q with the dependent coordinates nearby that keep the rows: Newton, as long as it halves what is left."""
+        """Return q with nearby dependent coordinates that keep the rows: Newton's method, as long as it halves the residual."""
         if not self.rows.size:
             return q
         left = np.inf
@@ -162,7 +162,7 @@ class _Run:
         return q, self.soa.X_r.at(q).dense() @ y[self.model.nq :]
 
     def rates(self, t: float, y: np.ndarray) -> np.ndarray:
-        """(q̇, θ̈_r); not finite where there are none, from which integrators step back."""
+        """Return (q̇, θ̈_r); not finite where they do not exist, so that integrators step back."""
         try:
             q, v = self.state(y)
             return np.concatenate([self.model.configuration_rate(q, v), self.accelerations(t, q, v)[self.independent]])
@@ -171,7 +171,8 @@ class _Run:
             return np.full(len(y), np.nan)
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
-        """∂rates/∂y for implicit integrators, by differences of one size: where Newton undoes a change, SciPy's own grow without bound."""
+        """Return ∂rates/∂y for implicit integrators, by differences of one size: SciPy's own grow without bound where Newton undoes a
+        change."""
         at, columns = self.rates(t, y), []
         for i in range(len(y)):
             moved = np.array(y)
@@ -219,18 +220,18 @@ class _Run:
         return EmbeddedMotion(times, np.array(qs), np.array(vs), self.choices, self.evaluations)
 
     def failed(self, solver: Any) -> str | None:
-        """A step; what is wrong where there is none."""
+        """Take a step; return the reason if it fails."""
         if not np.isfinite(getattr(solver, "h_abs", 0.0)):
             return "no first step"
         try:
             return solver.step()
-        except ValueError as error:  # of implicit integrators, whose matrices are not finite where rates are not
+        except ValueError as error:  # implicit integrators: matrices are not finite where rates are not
             if error is self.raised or isinstance(error, _core.ModelError):
                 raise
             return str(error)
 
     def chosen_anew(self, q: np.ndarray, worst: float) -> bool:
-        """Whether others are the independent coordinates from here on: where an entry of X_r is above `worst`."""
+        """Exchange independent coordinates if an entry of X_r exceeds `worst`; return whether they changed."""
         if not self.dependent.size or not self.independent:
             return False
         X = self.soa.X_r.at(q).dense()
@@ -247,6 +248,6 @@ class _Run:
             X = X @ np.linalg.inv(X[independent])
         try:
             self.choose([self.model.coordinate_names[i] for i in independent], q)
-        except _core.ModelError:  # a singular state: the choice in force is as good as any here
+        except _core.ModelError:  # at a singular state no choice is better than the present one
             return False
         return True

@@ -1,4 +1,4 @@
-"""Accelerations of a model on its loops, by the tree that the loops are embedded in (docs/loops.md)."""
+"""Accelerations of a model on its loops, by the tree in which the loops are embedded (docs/loops.md)."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from ..state import at_state
 
 
 def embedded_accelerations(model: Any, q: Any = None, v: Any = None, tau: Any = None, independent: Any = None, **how: Any) -> np.ndarray:
-    """Accelerations (nv,) or (B, nv) of the model that keep its loops, forces of the loops doing no work.
+    """Return accelerations (nv,) or (B, nv) of the model that keep its loops, with loop forces that do no work.
 
-    With the letters of `soa.embedded(independent)`, X its coordinate map, f = X*(τ - v ×* (J v)) with the rotors':
+    With the letters of `soa.embedded(independent)`, X its coordinate map, f = X*(τ - v ×* (J v)) with the rotors' J:
 
         (ℳ + J)θ̈_r = f - Hφ(Mφ*(a + a₀) + b) - X*J Ẋθ̇_r,        θ̈ = Xθ̈_r + Ẋθ̇_r
 
     Parameters
     ----------
-    q, v : one state on the loops, a batch of them, a `State`; the model's present one where they are left out
-    tau : (nv,) or (B, nv), N or N m; zero where it is left out
-    independent : as of `soa.embedded`; chosen at the first state where it is left out
-    how : form, precision, as of `Operator.at`
+    q, v : one state on the loops, a batch of them, a `State`; default: the model's present state
+    tau : (nv,) or (B, nv), N or N m; default: zero
+    independent : as in `soa.embedded`; default: chosen at the first state
+    how : form, precision, as in `Operator.at`
 
     Raises
     ------
     ModelError, EvaluationError
-        States that are off the loops or singular, velocities that break a row, which is named.
+        States that are off the loops or singular, velocities that violate a row, by name.
 
-    Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the chapter on constraint embedding. Cost: that of the embedded tree.
+    Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the chapter on constraint embedding. Cost: as the embedded tree.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def embedded_accelerations(model: Any, q: Any = None, v: Any = None, tau: Any = 
 
 
 class EmbeddedDynamics:
-    """The expressions of θ̈ for one choice of independent coordinates, made once for many states. `soa` : of `soa.embedded`."""
+    """The expressions of θ̈ for one choice of independent coordinates, built once for many states. `soa` : from `soa.embedded`."""
 
     def __init__(self, soa: Any):
         self.soa = soa
@@ -76,7 +76,7 @@ class EmbeddedDynamics:
         self._inverse = (soa.MM + soa.J).inv()
 
     def accelerations(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray, **how: Any) -> np.ndarray:
-        """θ̈ (nv,) or (B, nv), as of `embedded_accelerations`; q and v are of as many states, tau of as many or of one."""
+        """Return θ̈ (nv,) or (B, nv), as `embedded_accelerations`; q and v have the same number of states, tau the same or one."""
 
         def at(expression: Any) -> np.ndarray:
             return expression.at(q, v, **how).dense()

@@ -1,4 +1,4 @@
-"""The search for configurations at which forces balance, of models and scenes, and what becomes of small displacements there."""
+"""The search for equilibria of models and scenes, and the stability of small displacements there."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from ..arguments import one_number
 from .displacements import brackets, turning
 
 INDIFFERENT = 1e-9
-"""Eigenvalues of stiffness below this part of the largest are taken for zero."""
+"""Eigenvalues of stiffness below this part of the largest count as zero."""
 TOLERANCE = 1e-9
-"""What may be left of forces, as a part of the largest of those that balance."""
+"""Largest residual force, relative to the largest of the forces that balance."""
 
 ROUNDED = 2e-14
-"""What is left of forces that balance to rounding: sums over some tens of bodies, as a part of the largest."""
+"""Residual of forces that balance to rounding: sums over some tens of bodies, relative to the largest."""
 
 FAR = 1e4
-"""Radians and metres beyond which a model that goes down the slope of its forces is taken to go on without end."""
+"""Radians and metres beyond which a descent along the slope of the forces counts as endless."""
 
 STEPS = 5000
-"""Of a model that goes down the slope of its forces, at most."""
+"""Largest number of steps down the slope of the forces."""
 
 
 class Mode(NamedTuple):
-    """One way in which a mechanism leaves an equilibrium, or swings about it.
+    """One motion in which a mechanism leaves an equilibrium, or swings about it.
 
-    eigenvalue : rad²/s², μ of K φ = μ (ℳ + J) φ: swings with √μ where it is positive, leaves with √-μ where it is negative; complex where
-        forces have no potential. Where ℳ + J is not positive definite it is that of K alone, N m and N.
+    eigenvalue : rad²/s², μ of K φ = μ (ℳ + J) φ: swings with √μ if positive, leaves with √-μ if negative; complex if forces have no
+        potential. If ℳ + J is not positive definite, the eigenvalue of K alone, N m and N.
     shape : (nv,), φ, its largest entry 1; zero at held coordinates
-    coordinates : names of those that move by half as much as the largest or more
+    coordinates : names of those that move at least half as much as the largest
     stability : "stable", "unstable" or "indifferent" (to second order)
     """
 
@@ -50,11 +50,11 @@ class Equilibrium:
     Attributes
     ----------
     q : (nq,)
-    residual : (nv,) N m and N, what is left at free coordinates: rounding
-    holding : (nv,) N m and N, what holds the coordinates that were to be held; zero at the others
-    stiffness : (nv, nv), K = -∂(forces)/∂q along quasi-velocities: what a displacement asks for
-    modes : of the free coordinates, by rising eigenvalue
-    stability : "unstable" where one mode is, "indifferent" where none is unstable and one is indifferent, else "stable"
+    residual : (nv,) N m and N, at free coordinates: rounding
+    holding : (nv,) N m and N, the forces that hold the held coordinates; zero at the others
+    stiffness : (nv, nv), K = -∂(forces)/∂q along quasi-velocities: the forces that a displacement requires
+    modes : of the free coordinates, in ascending order of eigenvalues
+    stability : "unstable" if one mode is, "indifferent" if none is unstable and one is indifferent, else "stable"
     """
 
     q: np.ndarray
@@ -70,7 +70,8 @@ class Equilibrium:
 
 
 class Balance(NamedTuple):
-    """Forces at rest: `left` (nv,), what is not balanced; `along_q` (nv, nv), its derivative; `mass`, ℳ + J; `size` of what balances."""
+    """Forces at rest: `left` (nv,), the unbalanced part; `along_q` (nv, nv), its derivative; `mass`, ℳ + J; `size` of the balancing
+    forces."""
 
     left: np.ndarray
     along_q: np.ndarray
@@ -79,12 +80,13 @@ class Balance(NamedTuple):
 
     @property
     def sizes(self) -> np.ndarray:
-        """Of what balances at each coordinate, (nv,): `size`, or what a radian or metre changes there: stiff springs count at their own."""
+        """Sizes (nv,) of the balancing forces at each coordinate: `size`, or the change by a radian or metre there, as for stiff
+        springs."""
         return np.maximum(self.size, np.abs(self.along_q).max(axis=1, initial=0.0))
 
 
 def hinge_limits(model: Any, asked: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Limits (nv,) below and above, infinite where there are none or they are not asked for, and where a limited coordinate is in q."""
+    """Return lower and upper limits (nv,), infinite if absent or not requested, and the places of limited coordinates in q."""
     lower, upper, places = np.full(model.nv, -np.inf), np.full(model.nv, np.inf), np.zeros(model.nv, int)
     for hinge in model.hinges.values() if asked else ():
         if hinge.limits is None:
@@ -99,17 +101,17 @@ def hinge_limits(model: Any, asked: bool) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def checked_tolerance(tolerance: Any) -> float:
-    """What may be left of forces, as a number. EvaluationError where it is no part of them."""
+    """Return a tolerance for unbalanced forces. EvaluationError unless it is between 0 and 1."""
     number = one_number(tolerance, "tolerance")
     if not 0 < number < 1:
-        raise _core.EvaluationError(f"tolerance={number}: what may be left, as a part of the largest force, between 0 and 1")
+        raise _core.EvaluationError(f"tolerance={number}: the unbalanced part relative to the largest force, between 0 and 1")
     return number
 
 
 def solved(
     model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, held: Iterable[int], limits: bool, stable: bool, tolerance: Any
 ) -> Equilibrium:  # fmt: skip
-    """The equilibrium that is found from q0, of forces at rest as `at` has them. EvaluationError where there is none."""
+    """Return the equilibrium found from q0, for the forces at rest given by `at`. EvaluationError if there is none."""
     tolerance = checked_tolerance(tolerance)
     free = np.setdiff1d(np.arange(model.nv), list(held))
     search = _Search(model, at, np.array(q0, float), free, limits)
@@ -120,35 +122,36 @@ def solved(
         found = search.found(tolerance)
         if found.stability != "unstable":
             return found
-        search.push(found.modes[0].shape)  # away from where it would leave by itself
+        search.push(found.modes[0].shape)  # away from it in its unstable direction
     left = [mode.coordinates for mode in found.modes if mode.stability == "unstable"]
     raise _core.EvaluationError(
-        f"{model.name!r}: no stable equilibrium was found; the last leaves by {' and by '.join(', '.join(names) for names in left)}: start "
+        f"{model.name!r}: no stable equilibrium was found; the last is unstable along "
+        f"{' and along '.join(', '.join(names) for names in left)}: start "
         "elsewhere (q0=), hold these coordinates (hold=), or take what there is (stable=False)"
     )
 
 
 class _Search:
-    """On displacements x of free coordinates from q0: with q = q0 exp(x), δq = J(x) δx, J = (1 - e^-ad)/ad."""
+    """A search over displacements x of free coordinates from q0: with q = q0 exp(x), δq = J(x) δx, J = (1 - e^-ad)/ad."""
 
     def __init__(self, model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, free: np.ndarray, limits: bool):
         self.model, self.q, self.free, self._at = model, q0, free, at
         self._last: tuple[np.ndarray, Balance] | None = None
         self.curved = bool(brackets(turning(model), np.ones(model.nv)).any())
         self.limits = limits
-        if limits:  # start within them; where both are one there is nothing to search for
+        if limits:  # start within them; coordinates with equal limits are fixed
             lower, upper = self.bounds()
             self.q = self.moved(np.clip(0.0, lower, upper))[1]
             self.free = free[lower < upper]
 
     def at(self, q: np.ndarray) -> Balance:
-        """What balances there: kept for the question after."""
+        """Return the balance of forces at q, cached for the next request."""
         if self._last is None or not np.array_equal(self._last[0], q):
             self._last = (q, self._at(q))
         return self._last[1]
 
     def moved(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """All of x, and q there."""
+        """Return all components of x, and q there."""
         whole = np.zeros(self.model.nv)
         whole[self.free] = x
         if not np.isfinite(whole).all():
@@ -159,17 +162,17 @@ class _Search:
         return whole, self.model.integrate(self.q, whole)
 
     def left(self, x: np.ndarray) -> np.ndarray:
-        """What is not balanced, at free coordinates."""
+        """Return the unbalanced forces at free coordinates."""
         return self.at(self.moved(x)[1]).left[self.free]
 
     def slope(self, x: np.ndarray) -> np.ndarray:
-        """Its derivative by x."""
+        """Return the derivative of the unbalanced forces by x."""
         whole, q = self.moved(x)
         along = self.at(q).along_q[self.free]
         return along[:, self.free] if not self.curved else along @ self._turns(whole)[:, self.free]
 
     def _turns(self, whole: np.ndarray) -> np.ndarray:
-        """J(x), from the exponential of [[-ad, 1], [0, 0]]."""
+        """Return J(x), from the exponential of [[-ad, 1], [0, 0]]."""
         from scipy.linalg import expm
 
         n = len(whole)
@@ -178,7 +181,7 @@ class _Search:
         return np.asarray(expm(block)[:n, n:])
 
     def found(self, tolerance: float) -> Equilibrium:
-        """By SciPy's solvers, then by steps of Newton to rounding."""
+        """Search by SciPy's solvers, then by Newton steps to rounding."""
         from scipy.optimize import least_squares, root
 
         if len(self.free) and not self.balanced(ROUNDED):  # steps from there would follow rounding, far along indifferent directions
@@ -198,7 +201,7 @@ class _Search:
         return Equilibrium(self.q, residual, holding + 0.0, -now.along_q + 0.0, modes(self.model, now, np.eye(self.model.nv)[:, self.free]))
 
     def take(self, x: np.ndarray) -> None:
-        """Go on from there: only where less is left."""
+        """Continue from x if less is unbalanced there."""
         _, q = self.moved(x)
         if self.size_of(q) <= self.size_of(self.q):
             self.q = q
@@ -207,7 +210,7 @@ class _Search:
         return float(np.linalg.norm(self.at(q).left[self.free]))
 
     def sharpen(self) -> None:
-        """Newton's steps as long as less is left: at x = 0 J is the unit."""
+        """Take Newton steps as long as the residual falls: at x = 0, J is the identity."""
         lower, upper = self.bounds()
         for _ in range(5):
             now, before = self.at(self.q), self.q
@@ -223,12 +226,12 @@ class _Search:
         return bool((np.abs(now.left) <= tolerance * now.sizes)[self.free].all())
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of x: what is left to the limits of hinges, infinite where there are none or they are not asked for."""
+        """Return the bounds of x: the distances to the limits of hinges, infinite if absent or not requested."""
         lower, upper, places = hinge_limits(self.model, self.limits)
         return (lower - self.q[places])[self.free], (upper - self.q[places])[self.free]
 
     def go_down(self) -> None:
-        """Along ẋ = W J* (what is not balanced), W one over the diagonal of ℳ + J: downhill where forces have a potential."""
+        """Follow ẋ = W J* (unbalanced forces), W the inverse diagonal of ℳ + J: downhill if forces have a potential."""
         from scipy.integrate import solve_ivp
 
         if not len(self.free):
@@ -276,7 +279,7 @@ class _Search:
         self.q = self.moved(np.clip(end, *self.bounds()))[1]
 
     def push(self, shape: np.ndarray) -> None:
-        """A tenth of a radian or metre along a mode."""
+        """Move a tenth of a radian or metre along a mode."""
         self.q = self.moved(0.1 * np.real(shape)[self.free])[1]
 
     def refuse(self, now: Balance) -> None:
@@ -293,7 +296,7 @@ class _Search:
 
 
 def modes(model: Any, at: Balance, basis: np.ndarray) -> tuple[Mode, ...]:
-    """How displacements along the columns of a basis (nv, k) leave an equilibrium, or swing about it, by rising eigenvalue."""
+    """Return how displacements along the columns of a basis (nv, k) leave an equilibrium, or swing about it, by ascending eigenvalue."""
     from scipy.linalg import eig, eigh
 
     count = basis.shape[1]

@@ -1,11 +1,11 @@
-"""The search for configurations on the loops at which forces balance (docs/loops.md), of models and scenes.
+"""The search for equilibria on the loops (docs/loops.md), of models and scenes.
 
-With g what is left of forces at rest and N a basis of Q N = 0, of all rows, those of velocities too,
+With g the unbalanced forces at rest and N a basis of Q N = 0, for all rows, including rows of velocities,
 
     N*g = 0,   g + Q*λ = 0,     and along y with δq = N y:   ∂(N*g) = N*(∂g + ∂(Q*λ)) N
 
-The steps are Newton's, or towards where forces push, (1/h + K) y = N*g with h growing as N*g shrinks (pseudo-transient continuation: C. T.
-Kelley, D. E. Keyes, SIAM J. Numerical Analysis 35, 1998); after each the state is taken onto the loops.
+The steps are Newton's, or follow the forces, (1/h + K) y = N*g with h growing as N*g shrinks (pseudo-transient continuation: C. T. Kelley,
+D. E. Keyes, SIAM J. Numerical Analysis 35, 1998); after each step the state is projected onto the loops.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from .loop_tangents import KeptRows, kept_rows
 
 STEPS = 500
 FARTHEST = 0.3
-"""Radians and metres of one step."""
+"""Largest step, radians and metres."""
 ROUNDING = 1e-12
-"""Radians and metres by which a coordinate that stands at its limit may be beyond it."""
+"""Radians and metres by which a coordinate at its limit may exceed it."""
 
 
 @dataclass(frozen=True)
 class _State:
-    """At q: the balance of forces with those of the rows in it, sizes of what balances, the rows, N of unit inertia, N*g, and λ."""
+    """A state at q: the balance of forces and of the rows, sizes of the forces, the rows, N of unit inertia, N*g, and λ."""
 
     q: np.ndarray
     balance: Balance
@@ -52,7 +52,7 @@ def solved_on_loops(
     model: Any, at: Callable[[np.ndarray], Balance], q0: np.ndarray, loops: Iterable[str], held: Iterable[int], limits: bool, stable: bool,
     tolerance: Any,
 ) -> Equilibrium:  # fmt: skip
-    """The equilibrium that is found from the state on the loops near q0. EvaluationError where there is none."""
+    """Return the equilibrium found from the state on the loops near q0. EvaluationError if there is none."""
     low, high, _ = hinge_limits(model, limits)
     stuck = np.flatnonzero(low == high).tolist()
     search = _Search(model, at, list(loops), sorted({*held, *stuck}), limits, checked_tolerance(tolerance))
@@ -67,16 +67,16 @@ def solved_on_loops(
         made = search.equilibrium(found)
         if not stable or made.stability != "unstable":
             return made
-        leaving = 0.1 * np.real(made.modes[0].shape)  # from where it would leave by itself
+        leaving = 0.1 * np.real(made.modes[0].shape)  # in its unstable direction
         away = search.tried(found, leaving) or search.tried(found, -leaving)
         if away is None:
             break
         found = search.follow(away)
     left = [mode.coordinates for mode in made.modes if mode.stability == "unstable"]
     raise _core.EvaluationError(
-        f"{model.name!r}: no stable equilibrium was found on the loops; the last leaves by "
-        f"{' and by '.join(', '.join(one) for one in left)}: start elsewhere (q0=), hold these coordinates (hold=), or take what there is "
-        "(stable=False)"
+        f"{model.name!r}: no stable equilibrium was found on the loops; the last is unstable along "
+        f"{' and along '.join(', '.join(one) for one in left)}: start elsewhere (q0=), hold these coordinates (hold=), or take what "
+        "there is (stable=False)"
     )
 
 
@@ -85,14 +85,14 @@ class _Search:
         self.model, self._at, self.loops, self.held, self.tolerance = model, at, loops, held, tolerance
         self.limits = limits
         self.names = [model.coordinate_names[j] for j in held]
-        self.closing = model if set(model.loops) == set(loops) else deepcopy(model)  # of the loops that are kept alone
+        self.closing = model if set(model.loops) == set(loops) else deepcopy(model)  # only the loops that are kept
         for name in set(self.closing.loops) - set(loops):
             self.closing.loops.remove(name)
 
         self.lower, self.upper, self.places = hinge_limits(model, limits)
 
     def start(self, q0: np.ndarray) -> _State:
-        """At the state on the loops near q0, or near where q0 is within the limits. EvaluationError where it is not within them."""
+        """Return the state on the loops near q0, moved within the limits. EvaluationError if it is not within them."""
         own = np.asarray(q0)[self.places]
         into = np.clip(own, self.lower, self.upper) - own
         within = self.model.integrate(q0, into)
@@ -110,13 +110,13 @@ class _Search:
         return self.state(q)
 
     def beyond(self, q: np.ndarray) -> np.ndarray:
-        """How far each coordinate is beyond its limits, by more than a limit's rounding."""
+        """Return how far each coordinate exceeds its limits, by more than the rounding of a limit."""
         own = np.asarray(q)[self.places]
         off = np.maximum(np.maximum(self.lower - own, own - self.upper), 0.0)
         return np.where(off > ROUNDING, off, 0.0)
 
     def closed(self, q: np.ndarray, kept: Iterable[str] = ()) -> np.ndarray:
-        """The state on the loops near q, these coordinates and the held ones as they are."""
+        """Return the state on the loops near q, with these coordinates and the held ones unchanged."""
         return np.asarray(self.closing.assemble(q, fix=[*self.names, *(name for name in kept if name not in self.names)]).q)
 
     def state(self, q: np.ndarray) -> _State:
@@ -126,7 +126,7 @@ class _Search:
         bent = rows.derivatives(still, still, multipliers)[3]
         carried = rows.Q.T @ multipliers
         size = max(given.size, np.abs(carried).max(initial=0.0))
-        sizes = given._replace(size=size).sizes  # without what loops bend: near singular states that would let pass all
+        sizes = given._replace(size=size).sizes  # without the curvature of loops: near singular states it would accept everything
         balance = Balance(given.left + carried, given.along_q + bent, given.mass, size)
         N = rows.null
         mass = N.T @ given.mass @ N
@@ -142,7 +142,7 @@ class _Search:
         return bool((np.abs(state.balance.left) <= self.tolerance * state.sizes).all())
 
     def newton(self, state: _State) -> _State | None:
-        """Steps of Newton, shortened until less is left, within limits, to rounding; None where that leads nowhere."""
+        """Take Newton steps, shortened until less is unbalanced, within limits, to rounding; None if they fail."""
         for _ in range(STEPS):
             step = state.basis @ np.linalg.lstsq(state.stiffness(), state.pushes, rcond=1e-12)[0]
             longest = np.abs(step).max(initial=0.0)
@@ -160,7 +160,7 @@ class _Search:
         return None
 
     def tried(self, state: _State, step: np.ndarray) -> _State | None:
-        """The state after a step; None where the loops do not reach so far, or only singular, or the limits do not."""
+        """Return the state after a step; None if the loops do not reach it, or only at a singular state, or a limit prevents it."""
         try:
             q = self.closed(self.model.integrate(state.q, step))
             return None if self.beyond(q).any() else self.state(q)
@@ -168,7 +168,7 @@ class _Search:
             return None
 
     def follow(self, state: _State) -> _State:
-        """Where forces push, until they are small."""
+        """Follow the forces until they are small."""
         first = state.size
         stiff = np.abs(np.linalg.eigvals(state.stiffness())).max(initial=0.0)
         h = 1.0 / stiff if stiff else 1.0
@@ -176,7 +176,7 @@ class _Search:
             if state.size <= 1e-6 * first or self.balanced(state):
                 return state
             step = state.basis @ np.linalg.lstsq(np.eye(len(state.pushes)) / h + state.stiffness(), state.pushes, rcond=None)[0]
-            if (state.basis.T @ state.balance.mass @ step) @ state.pushes <= 0:  # where K is negative by more than 1/h
+            if (state.basis.T @ state.balance.mass @ step) @ state.pushes <= 0:  # if K is more negative than 1/h
                 h = h / 4
                 continue
             longest = np.abs(step).max(initial=0.0)

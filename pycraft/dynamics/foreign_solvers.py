@@ -1,7 +1,7 @@
-"""Steps by other packages' solvers, as the core's run takes them: SciPy's, and SUNDIALS' CVODE by scikit-sundae.
+"""Steps of other packages' solvers, in the form that the core's run expects: SciPy's, and SUNDIALS' CVODE by scikit-sundae.
 
-Each has begin(rates, t, x, end, first_step), where rates(t, x) gives ẋ; step() -> (t, x), one step of the solver's own; and at(t) -> x
-within the last step, by the solver's own dense output.
+Each has begin(rates, t, x, end, first_step), where rates(t, x) returns ẋ; step() -> (t, x), one step of the solver; and at(t) -> x within
+the last step, by the solver's own dense output.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class SundialsSteps:
         self._run.init_step(t, x)
 
     def step(self) -> tuple[float, np.ndarray]:
-        for _ in range(2):  # after a look at what is between, CVODE gives the end of the step again
+        for _ in range(2):  # after interpolation, CVODE returns the end of the step again
             found = self._run.step(self._end, method="onestep", tstop=self._end)
             if not found.success or not np.isfinite(found.y).all():
                 why = found.message if not found.success else "the state is not finite"

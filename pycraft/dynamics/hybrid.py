@@ -15,11 +15,11 @@ from .prepared_states import refuse_other_states
 from .threads import over_threads
 
 KEPT = 16
-"""Sets of prescribed hinges whose workspaces a model keeps: a set that is switched back to costs nothing."""
+"""Number of sets of prescribed hinges with cached workspaces: switching back to a cached set is free."""
 
 
 HYBRID_OPTIONS = ("prescribed", "form", "refine", "residual", "precision")
-"""Of a prepared call."""
+"""Options of a prepared call."""
 
 
 class HybridMotion(NamedTuple):
@@ -30,12 +30,12 @@ class HybridMotion(NamedTuple):
 
 
 class HybridDerivatives(NamedTuple):
-    """Derivatives of what hybrid dynamics finds by what it is given, each (nv, nv) or (B, nv, nv), rows and columns by coordinate.
+    """Derivatives of the results of hybrid dynamics by its arguments, each (nv, nv) or (B, nv, nv), rows and columns by coordinate.
 
     Columns by tau are zero at prescribed coordinates, and columns by vdot at free ones.
 
-    vdot_q, vdot_v, vdot_tau, vdot_vdot : of the accelerations; rows of prescribed coordinates are zero but for the unit ones of vdot_vdot
-    tau_q, tau_v, tau_tau, tau_vdot : of the forces; rows of free coordinates are zero but for the unit ones of tau_tau
+    vdot_q, vdot_v, vdot_tau, vdot_vdot : of the accelerations; rows of prescribed coordinates are zero, except unit rows of vdot_vdot
+    tau_q, tau_v, tau_tau, tau_vdot : of the forces; rows of free coordinates are zero, except unit rows of tau_tau
     """
 
     vdot_q: np.ndarray
@@ -49,7 +49,7 @@ class HybridDerivatives(NamedTuple):
 
 
 def prescribed_names(prescribed: Any, option: str = "prescribed") -> tuple[str, ...]:
-    """Names of hinges or coordinates, one or several, handles included; of which option, for errors."""
+    """Return names of hinges or coordinates, given as one or several names or handles; `option`: its name, for errors."""
     names = tuple(getattr(one, "name", one) for one in several(prescribed))
     for name in names:
         if not isinstance(name, str):
@@ -59,7 +59,7 @@ def prescribed_names(prescribed: Any, option: str = "prescribed") -> tuple[str, 
 
 
 def hybrid_of(model: Any, prescribed: Any) -> _core.HybridDynamics:
-    """What computes with these prescribed, made at the first call and kept until the model is edited or others are."""
+    """Return the solver for these prescribed coordinates, cached until the model is edited or others displace it."""
     names = prescribed_names(prescribed)
     kept = model.__dict__.setdefault("_hybrid", {})
     key = (names, model._parameters)
@@ -72,12 +72,13 @@ def hybrid_of(model: Any, prescribed: Any) -> _core.HybridDynamics:
 
 
 class PreparedHybrid:
-    """What `Multibody.prepare` gives of hybrid dynamics; options are those of the call. It copies and pickles with its model."""
+    """The prepared call of hybrid dynamics, from `Multibody.prepare`, with the options of the call. It copies and pickles with its
+    model."""
 
     def __init__(self, model: Any, states: int | None, options: dict[str, Any]):
         defaults: dict[str, Any] = {"prescribed": (), "form": "fast", "refine": 0, "residual": "same", "precision": "double"}
         self._model, self._states, self._options = model, states, defaults | options
-        self._options["prescribed"] = prescribed_names(self._options["prescribed"])  # once, as what is listed may be gone then
+        self._options["prescribed"] = prescribed_names(self._options["prescribed"])  # once, as the listed objects may be gone later
         self._ready = self._made()
         self.__name__ = self.__qualname__ = "prepared_hybrid_dynamics"
         each = "one state" if states is None else f"{states} states"
@@ -93,7 +94,7 @@ class PreparedHybrid:
         found = self._ready(*given)
         if found is None:
             refuse_other_states("hybrid_dynamics", self._states, given)
-            self._ready = self._made()  # of the model as it is now
+            self._ready = self._made()  # for the model as it is now
             return self._model.hybrid_dynamics(*given, **self._options)
         return HybridMotion._make(found)
 
@@ -112,20 +113,21 @@ class HybridCalls:
         self, q=None, v=None, tau=None, vdot=None, prescribed: Any = (), *, form: str = "fast", refine: int | str = 0,
         residual: str = "same", precision: str | int = "double", threads: int = 1,
     ) -> HybridMotion:  # fmt: skip
-        """Accelerations where forces are given, forces where accelerations are: O(N).
+        """Return accelerations where forces are given, forces where accelerations are: O(N).
 
-        ℳ(q) v̇ + 𝒞(q, v) = τ with v̇ given at the prescribed coordinates and τ at the free ones, gravity and rotor inertia included. Nothing
-        prescribed is `forward_dynamics`, and everything `inverse_dynamics`, bit for bit. Any set may follow any other from call to call.
+        ℳ(q) v̇ + 𝒞(q, v) = τ with v̇ given at the prescribed coordinates and τ at the free ones, gravity and rotor inertia included. With
+        no prescribed coordinate it equals `forward_dynamics`, with all of them `inverse_dynamics`, bit for bit. The set may change from
+        call to call.
 
         Parameters
         ----------
-        q, v : (nq,), (nv,), each with an optional leading batch axis; v of all coordinates, prescribed ones too
-        tau : (nv,), N m and N; what it has at prescribed coordinates does not matter, but is finite. Zero where left out.
-        vdot : (nv,), rad/s² and m/s²; what it has at free coordinates does not matter, but is finite. Zero where left out.
+        q, v : (nq,), (nv,), each with an optional leading batch axis; v of all coordinates, including prescribed ones
+        tau : (nv,), N m and N; entries of prescribed coordinates are ignored, but must be finite. Default: zero.
+        vdot : (nv,), rad/s² and m/s²; entries of free coordinates are ignored, but must be finite. Default: zero.
         prescribed : names of hinges, coordinates or patterns, or a list of them
-            A subhinge of several coordinates (a ball) is prescribed whole. Locked hinges and welds, which have none, may be among them:
-            their bodies do not move against each other as it is.
-        form, refine, residual, precision : as in `forward_dynamics`, of the solution for the free coordinates
+            A subhinge of several coordinates (a ball) is prescribed as a whole. Locked hinges and welds, which have no coordinates, may be
+            among them.
+        form, refine, residual, precision : as in `forward_dynamics`, for the solution of the free coordinates
 
         Returns
         -------
@@ -134,9 +136,9 @@ class HybridCalls:
         Raises
         ------
         ModelError
-            A name that is not there, a coordinate that is prescribed twice, part of a ball or free subhinge.
+            An unknown name, a coordinate that is prescribed twice, part of a ball or free subhinge.
         SingularHingeError, RefinementError
-            As `forward_dynamics`, of free coordinates: one that feels no inertia may be prescribed.
+            As `forward_dynamics`, for free coordinates: a coordinate that feels no inertia may be prescribed.
 
         Source: hybrid (prescribed motion) dynamics [Jain 2011]; as operators `arm.soa.free(...)` and `arm.soa.prescribed(...)`.
 
@@ -157,15 +159,15 @@ class HybridCalls:
         self, q=None, v=None, tau=None, vdot=None, prescribed: Any = (), *, form: str = "fast", refine: int | str = 0,
         residual: str = "same", precision: str = "double", threads: int = 1,
     ) -> HybridDerivatives:  # fmt: skip
-        """Derivatives of `hybrid_dynamics`, whose arguments and errors these are.
+        """Return derivatives of `hybrid_dynamics`; arguments and errors are the same.
 
         With T_q and T_v the derivatives of inverse dynamics at the accelerations found, and rows and columns f free and p prescribed,
 
             δv̇_f = ℳ_ff⁻¹ (δτ_f - T_q,f δq - T_v,f δv - ℳ_fp δv̇_p),   δτ_p = T_q,p δq + T_v,p δv + ℳ_pf δv̇_f + ℳ_pp δv̇_p
 
-        Along q they are along quasi-velocities, as everywhere. O(N · depth + nv³), the last by a Cholesky factor of ℳ_ff.
+        Derivatives by q are along quasi-velocities, as everywhere. O(N · depth + nv³), the last term by a Cholesky factor of ℳ_ff.
         """
-        prescribed = prescribed_names(prescribed)  # once, as what is listed may be gone then
+        prescribed = prescribed_names(prescribed)  # once, as the listed objects may be gone later
         motion = self.hybrid_dynamics(
             q, v, tau, vdot, prescribed, form=form, refine=refine, residual=residual, precision=precision, threads=threads
         )
@@ -175,7 +177,8 @@ class HybridCalls:
 
 
 def _derivatives(T_q: np.ndarray, T_v: np.ndarray, mass: np.ndarray, held: np.ndarray) -> HybridDerivatives:
-    """Every product of matrices that lie row by row, as BLAS multiplies others otherwise, and a state has the bits that it has alone."""
+    """Return the derivatives, with C-contiguous matrices in every product: BLAS multiplies others differently, and a state has the bits
+    that it has alone."""
     f, p = np.flatnonzero(~held), np.flatnonzero(held)
     shape = np.broadcast_shapes(T_q.shape, mass.shape)
     found = {name: np.zeros(shape) for name in HybridDerivatives._fields}

@@ -1,4 +1,4 @@
-"""Inertial parameters, and what else acts at hinges, from logged motion and forces."""
+"""Inertial parameters, and other forces at hinges, from logged motion and forces."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .inertial_fit import Base, LeastSquares, base_of, distance, is_consistent, 
 from .logged_motion import logged_motion
 
 PARAMETERS = ("mass", "mx", "my", "mz", "ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-"""Of a body, in the regressor's order: m, m c, and the inertia about its origin."""
+"""Parameters of a body, in the regressor's order: m, m c, and the inertia about its origin."""
 EXCITING = 4
-"""How many times more equations than parameters say what can be told at all."""
+"""Ratio of equations to parameters from which states show everything identifiable."""
 
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """A combination of parameters that motion and forces tell: its value after the fit, and the standard error of least squares."""
+    """A combination of parameters that motion and forces determine: its value after the fit, and the standard error of least squares."""
 
     name: str
     value: float
@@ -51,17 +51,17 @@ class BodyParameters:
 
 @dataclass(frozen=True)
 class Identification:
-    """What a log says of a model: parameters after the fit, and how well they are known.
+    """Results of an identification: parameters after the fit, and their uncertainty.
 
     Attributes
     ----------
-    parameters : (10 n,) in the order of `Multibody.inertial_parameters`, those that were not asked for as the model has them
-    rotor_inertia, viscous, coulomb : (nv,) J, c, F of T = Y π + Y_J J + c v + F sign(v), the first as the model has it where not asked for
-    base : what can be told, by name, with standard errors of least squares
-    condition : of the base columns, each of unit length
-    consistent : whether all are parameters of bodies (pseudo-inertias positive, scalars not negative)
-    by : "least squares", or "clarabel" where these were not of bodies and should be
-    residuals : (K, nv), the logged forces less those of the fit
+    parameters : (10 n,) in the order of `Multibody.inertial_parameters`; parameters that were not identified have the model's values
+    rotor_inertia, viscous, coulomb : (nv,) J, c, F of T = Y π + Y_J J + c v + F sign(v); J has the model's values if not identified
+    base : identifiable combinations, by name, with standard errors of least squares
+    condition : condition number of the base columns, each of unit length
+    consistent : whether all parameters are physically possible (pseudo-inertias positive, scalars not negative)
+    by : "least squares", or "clarabel" if these parameters were not physically possible and `consistent` was set
+    residuals : (K, nv), the logged forces minus the fitted ones
     noise : (nv,) standard deviations of forces, given or estimated
     """
 
@@ -79,11 +79,11 @@ class Identification:
 
     @property
     def bodies(self) -> dict[str, BodyParameters]:
-        """Mass, centre of mass and inertia by body."""
+        """Return mass, centre of mass and inertia by body."""
         return dict(zip(self.model.bodies, map(BodyParameters.of, self.parameters.reshape(-1, 10)), strict=True))
 
     def predict(self, q: Any = None, v: Any = None, vdot: Any = None) -> np.ndarray:
-        """T (nv,) or (B, nv) of the fit: inverse dynamics with its parameters, and its friction. O(N · depth)."""
+        """Return T (nv,) or (B, nv) of the fit: inverse dynamics with its parameters, and its friction. O(N · depth)."""
         q, v = at_state(self.model, q, v)
         given = (("v", v), ("vdot", np.zeros(self.model.nv) if vdot is None else vdot))
         v, vdot = (np.asarray(_core.real_array(x, name), float) for name, x in given)
@@ -92,13 +92,13 @@ class Identification:
         return forces + self.viscous * v + self.coulomb * np.sign(v)
 
     def apply(self) -> Any:
-        """Gives the model these bodies and rotors; returns it. Friction is an effect's: `pc.effects.Damping(found.viscous)`.
+        """Set these bodies and rotors on the model; return the model. Friction is an effect: `pc.effects.Damping(found.viscous)`.
 
-        ModelError where they are not of bodies, with the model as it was.
+        ModelError if the parameters are not physically possible; the model is then unchanged.
         """
         if not self.consistent:
             bad = next((name for name, L in self._weakest().items() if L < 0), "a rotor or friction")
-            raise _core.ModelError(f"these are no parameters of a body, first those of {bad!r}: identify with consistent=True")
+            raise _core.ModelError(f"these parameters are not physically possible, first those of {bad!r}: identify with consistent=True")
         model = self.model
         before = {name: (body.mass, body.com, body.inertia) for name, body in model.bodies.items()}
         rotors = {name: hinge.rotor_inertia for name, hinge in model.hinges.items()}
@@ -117,7 +117,7 @@ class Identification:
         return model
 
     def _weakest(self) -> dict[str, float]:
-        """By body 0, or -1 where the parameters are none of a body."""
+        """Return the weakest value by body, 0 or -1 if the parameters are not those of a body."""
         return {
             name: 0.0 if is_consistent(pi[None]) else -1.0
             for name, pi in zip(self.model.bodies, self.parameters.reshape(-1, 10), strict=True)
@@ -141,38 +141,38 @@ class IdentificationCalls:
         self, q=None, v=None, vdot=None, tau=None, *, bodies: Any = None, rotors: Any = None, viscous: Any = None, coulomb: Any = None,
         consistent: bool = True, regularizer: str = "metric", regularization: float = 1e-3, noise: Any = None, apply: bool = False,
     ) -> Identification:  # fmt: skip
-        """Inertial parameters of bodies from logged motion and forces, T = Y(q, v, v̇) π + Y_J J + c v + F sign(v).
+        """Identify inertial parameters of bodies from logged motion and forces, T = Y(q, v, v̇) π + Y_J J + c v + F sign(v).
 
-        What T tells are combinations of parameters, the base ones, found by least squares; among all parameters with these the ones that
-        are nearest to the model's present ones are taken, which are the prior. Where they are not those of bodies (a negative mass, an
-        inertia that no body has) and `consistent`, the nearest bodies are: the least sum of squares in units of standard errors, and
-        `regularization` times the square of the distance from the prior, with pseudo-inertias positive, a semidefinite program.
+        T determines combinations of parameters, the base parameters, found by least squares; among all parameters with these combinations
+        the ones nearest to the model's present parameters, the prior, are returned. If they are not physically possible (a negative mass,
+        an impossible inertia) and `consistent`, the nearest possible ones are: the least sum of squares in units of standard errors, plus
+        `regularization` times the squared distance from the prior, with positive pseudo-inertias, a semidefinite program.
 
-        Gravity is the model's; without it masses that turn nothing are not told. Cost O(K N · depth) for the equations, O(K nv p²) for p
-        parameters.
+        Gravity is the model's; without it masses that turn nothing are not identifiable. Cost O(K N · depth) for the equations, O(K nv p²)
+        for p parameters.
 
         Parameters
         ----------
         q, v, vdot, tau : (K, nq), (K, nv), (K, nv), (K, nv), forces as `inverse_dynamics` gives them
-            Those of rotors, Y_J J (`rotor_regressor`), and friction included.
-            Or q alone: a run, or a table of one (`Run.to_dataframe`, columns "q.elbow", "v.elbow", "vdot.elbow"), with `tau` the names
-            of the effects whose forces were measured; of a table None: columns "tau.elbow".
-        bodies : names, or a list of them, whose parameters are looked for; None: all
-        rotors, viscous, coulomb : names of hinges, coordinates or patterns whose J, c, F are; True: all; None: none
-        consistent : whether parameters are to be those of bodies, and scalars not negative
-        regularizer : {"metric", "frobenius"}: distances that know no units and axes, or of pseudo-inertias entry by entry
-        regularization : of the semidefinite program, in squares of standard errors
-        noise : standard deviations of forces, one for all or (nv,); None: one for all, from the residuals
-        apply : whether the model takes the parameters (`Identification.apply`)
+            Forces of rotors, Y_J J (`rotor_regressor`), and friction included.
+            Or q alone: a run, or a table of one (`Run.to_dataframe`, columns "q.elbow", "v.elbow", "vdot.elbow"), with `tau` the names of
+            the effects with measured forces; for a table None: columns "tau.elbow".
+        bodies : names, or a list of them, of the bodies to identify; None: all
+        rotors, viscous, coulomb : names of hinges, coordinates or patterns with unknown J, c, F; True: all; None: none
+        consistent : whether parameters must be physically possible, and scalars not negative
+        regularizer : {"metric", "frobenius"}: distances independent of units and axes, or of pseudo-inertias entry by entry
+        regularization : weight in the semidefinite program, in squares of standard errors
+        noise : standard deviations of forces, one for all or (nv,); None: one for all, estimated from the residuals
+        apply : whether to set the parameters on the model (`Identification.apply`)
 
         Raises
         ------
         ModelError
-            Sizes, names, numbers that are not finite (with the row and the coordinate).
+            Sizes, names, values that are not finite (with the row and the coordinate).
         EvaluationError
-            A log that does not excite a combination, which is named; numbers whose squares are beyond the range of doubles.
+            A log that does not excite a combination, by name; values with squares beyond the range of doubles.
         ImportError
-            The semidefinite program is needed, and clarabel is missing (extra [identify]).
+            The semidefinite program is needed, but clarabel is missing (extra [identify]).
 
         Source: M. Gautier, W. Khalil, Direct calculation of minimum set of inertial parameters of serial robots, IEEE Transactions on
         Robotics and Automation 6 (1990); P. M. Wensing, S. Kim, J.-J. E. Slotine, IEEE Robotics and Automation Letters 3 (2018).
@@ -196,7 +196,7 @@ class IdentificationCalls:
         base = unknown.base(model)
         weights = np.ones(model.nv) if deviations is None else 1.0 / deviations
         rows = unknown.rows(model, q, v, vdot)
-        with np.errstate(over="ignore"):  # which is refused
+        with np.errstate(over="ignore"):  # it is refused
             b = (tau - unknown.known(model, q, v, vdot)) * weights
             equations = (rows * weights[:, None])[:, :, base.columns].reshape(b.size, len(base.columns))
             _refuse_beyond_range(model, equations, b)
@@ -231,7 +231,7 @@ class IdentificationCalls:
 
 @dataclass
 class _Unknowns:
-    """What is looked for: θ = (π of bodies, J, c, F of coordinates)."""
+    """The unknowns: θ = (π of bodies, J, c, F of coordinates)."""
 
     names: list[str]
     bodies: list[int]
@@ -253,7 +253,7 @@ class _Unknowns:
         return cls(names, list(dict.fromkeys(chosen)), *of.values())
 
     def rows(self, model: Any, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> np.ndarray:
-        """(K, nv, p)."""
+        """Return the rows (K, nv, p) of the unknowns."""
         K, n = v.shape
         Y = np.asarray(model.inertial_regressor(q, v, vdot)).reshape(K, n, len(model.bodies), 10)
         columns = [Y[:, :, self.bodies].reshape(K, n, 10 * len(self.bodies))]
@@ -265,7 +265,7 @@ class _Unknowns:
         return np.concatenate(columns, axis=2)
 
     def known(self, model: Any, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> np.ndarray:
-        """(K, nv): what is not looked for, as the model has it."""
+        """Return (K, nv): the part of the forces that is known, with the model's values."""
         pi = model.inertial_parameters().reshape(-1, 10)
         pi[self.bodies] = 0.0
         J = _rotors_of(model)
@@ -278,7 +278,7 @@ class _Unknowns:
         return np.concatenate([pi, _rotors_of(model)[self.rotors], np.zeros(len(self.viscous) + len(self.coulomb))])
 
     def base(self, model: Any) -> Base:
-        """By states that excite everything that can be excited."""
+        """Return the base parameters at states that excite everything that can be excited."""
         p, rng = len(self.names), np.random.default_rng(0)
         if not p or not model.nv:
             return Base(np.zeros(0, int), np.zeros((0, p)))
@@ -295,7 +295,7 @@ class _Unknowns:
         return is_consistent(theta[:many].reshape(-1, 10)) and bool((theta[many:] >= -1e-9 * typical).all())
 
     def all_of(self, model: Any, theta: np.ndarray) -> tuple[np.ndarray, ...]:
-        """π of all bodies, J, c, F of all coordinates."""
+        """Return π of all bodies, J, c, F of all coordinates."""
         pi, J, c, F = model.inertial_parameters().reshape(-1, 10), _rotors_of(model), np.zeros(model.nv), np.zeros(model.nv)
         counts = np.cumsum([10 * len(self.bodies), len(self.rotors), len(self.viscous)])
         pi_, J[self.rotors], c[self.viscous], F[self.coulomb] = np.split(theta, counts)
@@ -329,7 +329,7 @@ def _deviations(noise: Any, nv: int) -> np.ndarray | None:
 
 
 def _typical(rows: np.ndarray, tau: np.ndarray, prior: np.ndarray) -> np.ndarray:
-    """Sizes of scalars: of the prior, or those that by themselves would make all forces."""
+    """Return typical sizes of scalars: of the prior, or the sizes that alone would produce all forces."""
     makes = np.sqrt((rows**2).sum(axis=(0, 1)))
     alone = np.sqrt((tau**2).sum()) / np.where(makes > 0, makes, 1.0)
     return np.where(prior > 0, prior, np.where(alone > 0, alone, 1.0))
@@ -342,7 +342,7 @@ def _standard_errors(found: LeastSquares, sigma: float) -> np.ndarray:
 
 
 def _written(row: np.ndarray, names: list[str], most: int = 0) -> str:
-    """A combination, the largest part first where only so many are written."""
+    """Return a combination in words, the largest part first if it is shortened."""
     those = np.flatnonzero(row)
     if most:
         those = those[np.argsort(-np.abs(row[those]), kind="stable")]
@@ -370,6 +370,6 @@ def _refuse_unexcited(model: Any, unknown: _Unknowns, base: Base, found: LeastSq
     weakest[np.abs(weakest) < 1e-6] = 0.0
     told = _written(weakest, [unknown.names[i] for i in base.columns], most=4)
     raise _core.EvaluationError(
-        f"{count} states of {model.name!r} tell {found.rank} of {len(base.columns)} base parameters, and nothing along {told}: log motion "
-        "that excites it, or look for the parameters of some bodies alone (bodies=)"
+        f"{count} states of {model.name!r} determine {found.rank} of {len(base.columns)} base parameters, and not {told}: log motion "
+        "that excites it, or identify only some bodies (bodies=)"
     )

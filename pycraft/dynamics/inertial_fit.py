@@ -1,6 +1,6 @@
-"""Inertial parameters from linear equations: base parameters, least squares, and the nearest fit that is a body's.
+"""Inertial parameters from linear equations: base parameters, least squares, and the nearest physically possible fit.
 
-Ten numbers of a body are those of a body where its pseudo-inertia is positive,
+Ten parameters are those of a body if its pseudo-inertia is positive,
 
     L = [[Σ, m c], [m c*, m]] ⪰ 0,   Σ = ½ tr(I) 1 - I,
 
@@ -21,20 +21,20 @@ import numpy as np
 from .. import _core
 
 NOTHING = 1e-8
-"""What of a column of unit length is left by the columns before it, where it depends on them."""
+"""Remainder of a column of unit length after the columns before it, below which it depends on them."""
 ROUNDING = 1e-11
-"""What of a combination is no more than the rounding of its columns."""
+"""Entries of a combination below this are rounding of its columns."""
 CONSISTENT = 1e-9
-"""How negative an eigenvalue of a pseudo-inertia may be that is zero, beside its trace: rounding of a fit."""
+"""Tolerance for negative eigenvalues of a pseudo-inertia that should be zero, relative to its trace: rounding of a fit."""
 MARGIN = 1e-6
-"""How positive pseudo-inertias are made, in each direction beside the prior's."""
+"""Least pseudo-inertias of a fit, in each direction relative to the prior's."""
 LIFT = 1e-2
-"""What a prior without extent is lifted by, beside its size, where it measures distances."""
+"""Amount added to a prior without extent, relative to its size, where it measures distances."""
 HOLDS = "pip install 'pycraft-soa[identify]'"
 
 
 def _pseudo_inertia_map() -> np.ndarray:
-    """L of each of the ten parameters: (10, 4, 4)."""
+    """Return L of each of the ten parameters: (10, 4, 4)."""
     L = np.zeros((10, 4, 4))
     L[0, 3, 3] = 1.0
     for i in range(3):
@@ -50,34 +50,34 @@ OF_PARAMETERS = _pseudo_inertia_map()
 
 
 def pseudo_inertia(pi: np.ndarray) -> np.ndarray:
-    """L (..., 4, 4) of parameters (..., 10)."""
+    """Return L (..., 4, 4) of parameters (..., 10)."""
     return np.tensordot(pi, OF_PARAMETERS, axes=1)
 
 
 def is_consistent(pi: np.ndarray) -> bool:
-    """Whether parameters (n, 10) are those of bodies, to the rounding of a fit."""
+    """Check that parameters (n, 10) are those of bodies, to the rounding of a fit."""
     L = pseudo_inertia(pi)
     return bool((np.linalg.eigvalsh(L)[:, 0] >= -CONSISTENT * np.abs(np.trace(L, axis1=1, axis2=2))).all()) if len(pi) else True
 
 
 def without_rounding(pi: np.ndarray, prior: np.ndarray) -> np.ndarray:
-    """Parameters (n, 10), those of bodies without mass zero where nothing but the rounding of the others was found of them."""
+    """Return parameters (n, 10), with massless bodies set to zero if the fit found only the rounding of others in them."""
     size = np.abs(pi).max(axis=1, initial=0.0)
     return np.where((~prior.any(axis=1) & (size < ROUNDING * size.max(initial=0.0)))[:, None], 0.0, pi)
 
 
 @dataclass
 class Base:
-    """What can be told of parameters: β = combinations @ θ, by the columns that stand for it."""
+    """Identifiable combinations of parameters: β = combinations @ θ, by the columns that represent them."""
 
     columns: np.ndarray  # (r,)
     combinations: np.ndarray  # (r, p)
 
 
 def base_of(columns: np.ndarray) -> Base:
-    """The base parameters of columns (rows, p) at states that excite everything.
+    """Return the base parameters of columns (rows, p) at states that excite everything.
 
-    Columns in their order, by QR: one of which nothing is left by those before it is a combination of them, and joins their parameters.
+    Columns are taken in order, by QR: a column without a remainder is a combination of those before it, and its parameter joins theirs.
     """
     size = np.linalg.norm(columns, axis=0)
     used = np.flatnonzero(size > NOTHING * size.max(initial=0.0)) if size.size else np.zeros(0, int)
@@ -101,13 +101,13 @@ def base_of(columns: np.ndarray) -> Base:
 
 @dataclass
 class LeastSquares:
-    """β with rows @ β near to b, where the rows tell all of it."""
+    """β with rows @ β near to b, if the rows determine all of it."""
 
-    beta: np.ndarray  # zeros where they do not
+    beta: np.ndarray  # zeros if they do not
     R: np.ndarray  # of rows = Q R
-    left: float  # the mean square of what is left, by degrees of freedom
+    left: float  # the mean square of the residual, by degrees of freedom
     singular: np.ndarray  # of columns of unit length
-    weakest: np.ndarray  # what changes the left side least
+    weakest: np.ndarray  # the direction that changes the left side least
 
     @property
     def rank(self) -> int:
@@ -119,7 +119,7 @@ class LeastSquares:
 
 
 def least_squares(rows: np.ndarray, b: np.ndarray) -> LeastSquares:
-    """By QR of columns of unit length."""
+    """Solve by QR of columns of unit length."""
     size = np.linalg.norm(rows, axis=0)
     size[size == 0] = 1.0
     if not len(size):
@@ -136,10 +136,10 @@ def least_squares(rows: np.ndarray, b: np.ndarray) -> LeastSquares:
 
 
 def distance(prior: np.ndarray, scalars: np.ndarray, regularizer: str) -> np.ndarray:
-    """W (p, p) of the square of a distance from the prior (n, 10), then from scalars by their sizes.
+    """Return W (p, p) of the squared distance from the prior (n, 10), then from scalars by their sizes.
 
-    "frobenius": ‖L - L₀‖²; "metric": tr(L₀⁻¹ΔL L₀⁻¹ΔL), which knows no units and no axes, and is twice the entropic divergence of L from L₀
-    in its first order that is not zero. Source: T. Lee, P. M. Wensing, F. C. Park, Geometric robot dynamic identification: a convex
+    "frobenius": ‖L - L₀‖²; "metric": tr(L₀⁻¹ΔL L₀⁻¹ΔL), which is independent of units and axes, and is twice the entropic divergence of L
+    from L₀ to its first nonzero order. Source: T. Lee, P. M. Wensing, F. C. Park, Geometric robot dynamic identification: a convex
     programming approach, IEEE Transactions on Robotics 36 (2020).
     """
     if regularizer not in ("metric", "frobenius"):
@@ -162,11 +162,11 @@ def distance(prior: np.ndarray, scalars: np.ndarray, regularizer: str) -> np.nda
 
 
 def nearest(prior: np.ndarray, W: np.ndarray, base: Base, beta: np.ndarray) -> np.ndarray:
-    """θ with these base parameters that is nearest to the prior."""
+    """Return θ with these base parameters that is nearest to the prior."""
     if not len(beta):
         return prior.copy()
     carried, theta = np.linalg.solve(W, base.combinations.T), prior
-    for _ in range(2):  # once more for what rounding left
+    for _ in range(2):  # once more to remove rounding
         theta = theta + carried @ np.linalg.solve(base.combinations @ carried, beta - base.combinations @ theta)
     return theta
 
@@ -174,10 +174,11 @@ def nearest(prior: np.ndarray, W: np.ndarray, base: Base, beta: np.ndarray) -> n
 def nearest_bodies(
     prior: np.ndarray, W: np.ndarray, base: Base, found: LeastSquares, sigma: float, weight: float, bodies: int
 ) -> np.ndarray:
-    """θ of bodies, their scalars not negative: the least ‖R(β - β̂)‖²/σ² + weight ‖θ - θ₀‖². A semidefinite program, by Clarabel.
+    """Return physically possible θ, scalars not negative: the least ‖R(β - β̂)‖²/σ² + weight ‖θ - θ₀‖². A semidefinite program, by
+    Clarabel.
 
-    What is added to the plain fit is S C⁻¹ y, S the sizes of the prior and C triangular, C*C = S (B*R*RB/(weight σ²) + W) S from a QR that
-    squares nothing: the objective is ½‖y‖² and a linear part, whatever the log's part and the prior's are to each other.
+    The correction of the plain fit is S C⁻¹ y, S the sizes of the prior and C triangular, C*C = S (B*R*RB/(weight σ²) + W) S from a QR that
+    squares nothing: the objective is ½‖y‖² and a linear part, whatever the ratio of the log's part and the prior's.
 
     Raises
     ------
@@ -190,7 +191,8 @@ def nearest_bodies(
         import clarabel
     except ImportError:
         raise ImportError(
-            f"a fit that is to be of bodies, where least squares are of none, needs clarabel: {HOLDS}; consistent=False does not"
+            f"least squares give parameters that are not physically possible; the nearest that are "
+            f"need clarabel: {HOLDS}; or take consistent=False"
         ) from None
     from scipy import linalg, sparse
 
@@ -218,7 +220,7 @@ def nearest_bodies(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
-    settings.tol_infeas_abs = settings.tol_infeas_rel = 1e-300  # bodies there are: the prior is one
+    settings.tol_infeas_abs = settings.tol_infeas_rel = 1e-300  # a feasible point exists: the prior
     positive = np.vstack(rows)
     solution: Any = clarabel.DefaultSolver(
         sparse.eye(len(prior), format="csc"), to.T @ (W @ (plain - prior)), sparse.csc_matrix(-positive @ to),

@@ -22,7 +22,7 @@ from .inverse_on_loops import ConstrainedInverseCalls
 from .quadratic import QuadraticCalls
 from .statics import StaticsCalls
 from .statistical import StatisticalCalls
-from .stiff_motion import TAKE, TAKE_DOUBLE, stiffness_text
+from .stiff_motion import SHORTER, TAKE, TAKE_DOUBLE, stiffness_text
 from .task_space import TaskSpaceCalls
 
 if TYPE_CHECKING:
@@ -49,17 +49,16 @@ class IntegrationCalls(
     if TYPE_CHECKING:
 
         def _say(self, text: str) -> None:
-            """Warn, at the line outside the package."""
+            """Issue a warning at the line outside the package."""
 
     def _integration(self) -> _core.Integration:
         return cached(self, "_trajectories", _core.Integration)
 
     def configuration_rate(self, q=None, v=None, *, precision: str = "double", out=None) -> np.ndarray:
-        """Rates q̇ (nq,) or (B, nq) of the coordinates at the velocities v. O(N).
+        """Return the rates q̇ (nq,) or (B, nq) of the coordinates at the velocities v. O(N).
 
-        Pins, sliders, screws: v itself. Ball: ½ q⊗(0, ω), ω in the body's axes. Free: that, and the linear velocity turned into the axes of
-        the position, R(q/|q|) v. A quaternion's rate is orthogonal to it: its length stays, and is not pulled to one.
-        """
+        Pins, sliders, screws: v itself. Ball: ½ q⊗(0, ω), ω in the body's axes. Free: the same, and the linear velocity in the axes of the
+        position, R(q/|q|) v. The rate of a quaternion is orthogonal to it: its length is constant, but is not normalised to one."""
         q, v = at_state(self, q, v)
         return self._integration().configuration_rate(q, v, precision, out)
 
@@ -80,35 +79,35 @@ class IntegrationCalls(
         form: str = "fast",
         refine: Any = 0,
     ) -> Trajectory:
-        """The motion from (q, v) at times[0], by forward dynamics under the generalized forces tau - damping * v.
+        """Integrate the motion from (q, v) at times[0], by forward dynamics under the generalized forces tau - damping * v.
 
         Parameters
         ----------
-        q, v : (nq,), (nv,) at times[0]; q may be a State, which brings its v where v is None; None for the model's present state
+        q, v : (nq,), (nv,) at times[0]; q may be a State, which brings its v if v is None; None: the model's present state
         times : (T,) s, strictly increasing or strictly decreasing
         tau, damping : (nv,) constant generalized forces, and viscous damping coefficients; zero by default
         integrator : {"dopri5", "dop853", "rosenbrock4", "rkmk4", "variational2", "scipy:DOP853", "radau", "cvode", ...}
-            `pycraft.dynamics.integrator_names.integrator_names()` lists them, docs/simulation.md says when to take which. The core's end a
-            step at every time asked for. SciPy's ("scipy:RK45", "scipy:DOP853", "scipy:Radau", "scipy:BDF", "scipy:LSODA", or the last part
-            alone, where "dop853" is the core's and "DOP853" SciPy's) and those of SUNDIALS ("sundials:BDF" or "cvode", "sundials:Adams";
-            extra [sundials]) interpolate, and call from Python.
+            `pycraft.dynamics.integrator_names.integrator_names()` lists them, docs/simulation.md explains the choice. The core's
+            integrators end a step at every time requested. SciPy's ("scipy:RK45", "scipy:DOP853", "scipy:Radau", "scipy:BDF",
+            "scipy:LSODA", or the last part alone, where "dop853" is the core's and "DOP853" SciPy's) and those of SUNDIALS ("sundials:BDF"
+            or "cvode", "sundials:Adams"; extra [sundials]) interpolate, and run through Python.
         rtol, atol : tolerances on the error of one step, per component of (q, v)
         step : s
-            Of one-size steps (the largest that divides the interval and is at most this); the first step of the others, chosen if left out.
+            For constant steps: the largest that divides the interval and is at most this; for the others the first step. Default: chosen.
         normalise : {"never", "each step"}
-            Whether quaternions are set to unit length after each step. Their drift is an integrator's own error.
+            Whether to normalise quaternions after each step. Their drift is an integrator's own error.
         precision : {"double", "extended", "quad"}
-            Of everything inside; results are float64. Solvers of other packages keep the state in double and take it for forward
-            dynamics alone; "rosenbrock4" takes "double".
-        form, refine : as forward_dynamics takes them
+            Of the whole computation; results are float64. Solvers of other packages keep the state in double and use it for forward
+            dynamics only; "rosenbrock4" accepts "double".
+        form, refine : as in `forward_dynamics`
 
         Raises
         ------
         EvaluationError
-            An unknown name (lists the names there are), times out of order, tolerances below the precision; the time where the step size
+            An unknown name (lists the known ones), times out of order, tolerances below the precision; the time at which the step size
             falls to rounding or the state is no longer finite.
         SingularHingeError
-            Of forward dynamics, with the time.
+            From forward dynamics, with the time.
 
         Examples
         --------
@@ -135,7 +134,7 @@ class IntegrationCalls(
         )  # fmt: skip
 
     def _stiff(self, integrator: str, precision: Any, found: Mapping[str, Any]) -> None:
-        remedy = TAKE if precision == "double" else TAKE_DOUBLE
+        remedy = SHORTER if found["longest"] else TAKE if precision == "double" else TAKE_DOUBLE
         self._say(stiffness_text(f"the motion of {self.name!r}", integrator, found, remedy))
 
     def _trajectory(
@@ -157,9 +156,9 @@ class IntegrationCalls(
         right_hand_side=None,
         told: bool = False,
     ) -> Trajectory:
-        """The same of arguments that are checked. right_hand_side: (t, q, v) -> v̇ in place of forward dynamics, for explicit methods.
+        """Integrate with checked arguments. right_hand_side: (t, q, v) -> v̇ in place of forward dynamics, for explicit methods.
 
-        told : whether a ModelWarning says that the motion is stiff.
+        told : whether a ModelWarning reports stiff motion
         """
         from .trajectory import Trajectory
 
@@ -173,7 +172,7 @@ class IntegrationCalls(
 
 
 def _checked_times(times: Any) -> np.ndarray:
-    """Times as an array of their own (T,). EvaluationError where there is none, or one is not finite."""
+    """Return a copy of the times as an array (T,). EvaluationError if it is empty or has values that are not finite."""
     made = np.atleast_1d(np.array(_core.real_array(times, "times")))
     if made.ndim != 1 or not made.size:
         raise _core.EvaluationError(f"times: a list of times in seconds, not an array of shape {made.shape}")

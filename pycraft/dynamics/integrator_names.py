@@ -8,24 +8,24 @@ from typing import Any
 from .. import _core
 
 SCIPY = ("RK45", "DOP853", "Radau", "BDF", "LSODA")
-"""SciPy's solvers; as integrators they are called "scipy:RK45", or "RK45" or "rk45" for short; but "dop853" is the core's."""
+"""SciPy's solvers; as integrators their names are "scipy:RK45", or "RK45" or "rk45" for short; but "dop853" is the core's."""
 SUNDIALS = ("BDF", "Adams")
 """The methods of SUNDIALS' CVODE; "sundials:BDF", "cvode" for short, and "sundials:Adams"."""
 SHORT = {name.lower(): f"scipy:{name}" for name in SCIPY} | {"cvode": "sundials:BDF", "adams": "sundials:Adams"}
-"""By lower-case names: no integrator of the core is called so, except "dop853", which only SciPy's own spelling DOP853 distinguishes."""
+"""By lower-case names: no integrator of the core has one of them, except "dop853", which only SciPy's own spelling DOP853 distinguishes."""
 SOLVE_FOR_STEPS = ("scipy:Radau", "scipy:BDF", "scipy:LSODA", "sundials:BDF")
-"""Those from outside of the core that take implicit steps, for stiff motion."""
+"""External integrators with implicit steps, for stiff motion."""
 
 
 @dataclass(frozen=True)
 class IntegratorName:
-    """An integrator's full name, and whether it is not the core's own."""
+    """The full name of an integrator, and whether it is external to the core."""
 
     name: str
     foreign: bool
 
     def solver(self, rtol: float, atol: float, max_step: float = 0.0) -> Any:
-        """What takes its steps, for the core; None for one of the core's own."""
+        """Return the solver that takes its steps, for the core; None for the core's own integrators."""
         if not self.foreign:
             return None
         for what, tolerance in (("rtol", rtol), ("atol", atol)):
@@ -38,12 +38,12 @@ class IntegratorName:
 
 
 def integrator_names() -> list[str]:
-    """All integrators, the core's and those of other packages."""
+    """Return the names of all integrators, of the core and of other packages."""
     return [*_core.integrators(), *(f"scipy:{name}" for name in SCIPY), *(f"sundials:{name}" for name in SUNDIALS)]
 
 
 def integrator_named(name: Any) -> IntegratorName:
-    """The integrator of a name, or of a short one; the core's names come first. EvaluationError lists those there are."""
+    """Return the integrator of a full or short name; the core's names have priority. EvaluationError lists the names."""
     given = SHORT.get(name.lower(), name) if isinstance(name, str) and name not in _core.integrators() else name
     if isinstance(given, str) and (instead := _core.retired_integrator(given)):
         raise _core.EvaluationError(instead)
@@ -53,5 +53,5 @@ def integrator_named(name: Any) -> IntegratorName:
 
 
 def takes_one_size(name: str) -> bool:
-    """Whether an integrator takes steps of one size, by its full name."""
+    """Check that an integrator takes steps of constant size, by its full name."""
     return any(row["name"] == name and not row["controlled"] for row in _core.integrator_table())

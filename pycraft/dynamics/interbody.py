@@ -1,4 +1,4 @@
-"""Interbody forces: what every hinge puts on the body that it moves."""
+"""Interbody forces: the force of every hinge on the body that it moves."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ PARTS = ("whole", "reaction")
 
 
 class InterbodyDerivatives(NamedTuple):
-    """Derivatives of the forces of all hinges, in the bodies' axes, by what they are found from: (N, 6, nv) or (B, N, 6, nv) each.
+    """Derivatives of the forces of all hinges, in the bodies' axes, by the arguments: (N, 6, nv) or (B, N, 6, nv) each.
 
     q : along coordinates, on ball and free hinges along quasi-velocities
     v : by velocities
-    input : by generalized forces, or by accelerations where these were given
+    input : by generalized forces, or by accelerations if these were given
     """
 
     q: np.ndarray
@@ -43,42 +43,44 @@ class InterbodyCalls:
         wrench_axes: str = "world", axes: Any = "body", about: Any = None, part: str = "whole", loops: bool = False, form: str = "fast",
         refine: int | str = 0, residual: str = "same", precision: str = "double",
     ) -> np.ndarray:  # fmt: skip
-        """The spatial forces (moment; force) that parents put on their children through the hinges: O(N).
+        """Return the spatial forces (moment; force) of parents on their children through the hinges: O(N).
 
-        f(k) = M(k) α(k) + b(k) - w(k) + Σ_{children c} E(k,c) f(c), by Newton-Euler from the tips, after the accelerations that are given,
-        or found by forward dynamics under `tau`, of the tree: what closes loops is among `wrenches` (docs/interbody_forces.md). Along its
-        own coordinates a hinge carries what drives it, H f + J v̇ + v ×* (J v) = τ with J the rotors'; across them, what holds the bodies
-        together.
+        f(k) = M(k) α(k) + b(k) - w(k) + Σ_{children c} E(k,c) f(c), by Newton-Euler from the tips, with the accelerations given, or found
+        by forward dynamics under `tau`, of the tree: forces that close loops belong to `wrenches` (docs/interbody_forces.md). Along its own
+        coordinates a hinge carries the driving force, H f + J v̇ + v ×* (J v) = τ with J of the rotors; across them, the force that holds
+        the bodies together.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
-        tau : (nv,), N m and N; zero where neither it nor vdot is given
+        tau : (nv,), N m and N; zero if neither it nor vdot is given
         vdot : (nv,), rad/s² and m/s², in place of tau
         hinges : a name or `Hinge`, or a list of them; None: all, in the model's order
-        wrenches : by name of a body or node, (6,) or (B, 6), the moment first: what acts there from outside, about its origin
-        wrench_axes : {"world", "body"}, those in which they are given: the world's, or the node's own
+        wrenches : by name of a body or node, (6,) or (B, 6), the moment first: external wrenches there, about its origin
+        wrench_axes : {"world", "body"}, their axes: the world's, or the node's own
         axes : {"body", "aligned", "world"} or a frame
             The child's own, about its origin; the world's, about the child's origin; the world's, about the world's origin; any frame's,
-            about its origin (`Frame`, or its name; moved ones at `arm.frames.t`).
+            about its origin (`Frame`, or its name; moved frames at `arm.frames.t`).
         about : a frame, or (3,) in the world's axes: another point for the moments
         part : {"whole", "reaction"}
-            "reaction" is what does no work along the hinge's coordinates, f - H⁺H f with H⁺ = H*(HH*)⁻¹ about the child's origin, in metres
+            "reaction" is the part that does no work along the hinge's coordinates, f - H⁺H f with H⁺ = H*(HH*)⁻¹ about the child's origin,
+            in metres
         loops : bool
-            Whether the loops' forces act too: after `constrained_dynamics` under `tau`. A coupling's are along its hinges, in Hf.
-        form, refine, residual : as in `forward_dynamics`, of the accelerations
-        precision : {"single", "double", "extended", "quad"}, of everything
+            Whether the loops' forces act as well, from `constrained_dynamics` under `tau`. Forces of a coupling act along its hinges, in
+            Hf.
+        form, refine, residual : as in `forward_dynamics`, for the accelerations
+        precision : {"single", "double", "extended", "quad"}, of the whole computation
 
         Returns
         -------
-        (N, 6) or (B, N, 6), N m and N; of one hinge (6,) or (B, 6)
+        (N, 6) or (B, N, 6), N m and N; for one hinge (6,) or (B, 6)
 
         Raises
         ------
         ModelError
-            A hinge, node or frame that is not there; tau or loops beside vdot; wrenches of another shape, not finite, or on the base.
+            An unknown hinge, node or frame; tau or loops beside vdot; wrenches of the wrong shape, not finite, or on the base.
         EvaluationError
-            Axes and parts that are not there.
+            Unknown axes and parts.
         SingularHingeError
             As `forward_dynamics`.
 
@@ -98,7 +100,9 @@ class InterbodyCalls:
         rows = hinge_numbers(self, hinges)
         if switch(loops, "loops"):
             if known:
-                raise _core.ModelError("interbody forces on the loops follow from tau: accelerations alone do not tell the loops' forces")
+                raise _core.ModelError(
+                    "interbody forces on the loops follow from tau: accelerations alone do not determine the loops' forces"
+                )
             how: dict[str, Any] = {"form": form, "refine": refine, "residual": residual, "precision": precision}
             model: Any = self
             on_loops = model.constrained_dynamics(q, v, tau, wrenches=wrenches, wrench_axes=wrench_axes, **how)
@@ -112,11 +116,11 @@ class InterbodyCalls:
         return in_axes(self, q, f[..., rows, :], X[..., rows, :, :], axes, about)
 
     def base_reaction(self, q=None, v=None, tau=None, *, axes: Any = "world", about: Any = None, **options: Any) -> np.ndarray:
-        """What the base puts on the model, (6,) or (B, 6): the sum of the forces of the hinges on it, by default about the world's origin;
-        with loops=True, of the loops that end there, too.
+        """Return the force of the base on the model, (6,) or (B, 6): the sum of the forces of its hinges, by default about the world's
+        origin; with loops=True, including the loops that end at the base.
 
-        Arguments are those of `interbody_forces`; axes "body" and "aligned" are of no one body here and are refused. A model that floats
-        is carried by nothing: zero to rounding.
+        Arguments as in `interbody_forces`; axes "body" and "aligned" belong to one body and are refused here. For a floating model it is
+        zero to rounding.
 
         Examples
         --------
@@ -129,7 +133,7 @@ class InterbodyCalls:
         if isinstance(axes, str) and axes in ("body", "aligned"):
             raise _core.EvaluationError(f"axes={axes!r} of a base reaction: there are 'world', and those of a frame")
         if "hinges" in options:
-            raise _core.EvaluationError("a base reaction is of all hinges on the base; interbody_forces takes hinges=")
+            raise _core.EvaluationError("a base reaction sums all hinges on the base; interbody_forces takes hinges=")
         model: Any = self
         on_base = [name for name, hinge in model.hinges.items() if hinge.body.parent is None]
         reaction = self.interbody_forces(q, v, tau, hinges=on_base, axes=axes, about=about, **options).sum(axis=-2)
@@ -137,7 +141,7 @@ class InterbodyCalls:
             return reaction
         of_hinges = {"part": options.pop("part", "whole")}
         if is_reaction(of_hinges["part"]):
-            raise _core.EvaluationError("part='reaction' of a base reaction is of hinges; loops=True takes part='whole'")
+            raise _core.EvaluationError("part='reaction' of a base reaction applies to hinges; with loops=True use part='whole'")
         q, v = at_state(self, q, v)
         on_base_by_loops = loop_wrenches(self, model.constrained_dynamics(q, v, tau, **options).forces, q, True)[1]
         return reaction - in_axes(self, q, on_base_by_loops, np.eye(4), axes, about)
@@ -146,14 +150,14 @@ class InterbodyCalls:
         self, q=None, v=None, tau=None, *, vdot=None, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world",
         form: str = "fast", refine: int | str = 0, residual: str = "same",
     ) -> InterbodyDerivatives:  # fmt: skip
-        """Derivatives of `interbody_forces` in the bodies' axes, whose arguments and errors these are; exact.
+        """Return exact derivatives of `interbody_forces` in the bodies' axes; arguments and errors are the same.
 
-        After accelerations ∂f/∂q, ∂f/∂v and ∂f/∂v̇, by the recursion's own arithmetic on numbers with derivatives; under generalized
-        forces, with T = Hf + Jv̇ differentiated beside f,
+        For given accelerations ∂f/∂q, ∂f/∂v and ∂f/∂v̇, by automatic differentiation of the recursion; under generalized forces, with T =
+        Hf + Jv̇ differentiated beside f,
 
             dv̇ = (ℳ + J)⁻¹ (dτ - ∂T/∂q dq - ∂T/∂v dv),   df = ∂f/∂q dq + ∂f/∂v dv + ∂f/∂v̇ dv̇.
 
-        Wrenches keep their numbers in the axes in which they are given. O(N nv), in double precision.
+        Wrenches keep their components in the axes in which they are given. O(N nv), in double precision.
         """
         known = self._given(tau, vdot)
         q, v = at_state(self, q, v)
@@ -169,14 +173,14 @@ class InterbodyCalls:
         return InterbodyDerivatives(f_q - by_tau @ T_q[..., None, :, :], f_v - by_tau @ T_v[..., None, :, :], by_tau)
 
     def _given(self, tau: Any, vdot: Any) -> bool:
-        """Whether accelerations are given."""
+        """Check that accelerations are given."""
         if tau is not None and vdot is not None:
             raise _core.ModelError("interbody forces follow from tau or from vdot: give one of them")
         return vdot is not None
 
 
 def pushed(wrenches: Mapping[Any, Any] | None, wrench_axes: str) -> tuple[list[str], bool, np.ndarray]:
-    """Names, whether in the world's axes, and numbers (..., L, 6) of wrenches as users give them."""
+    """Return names, whether in the world's axes, and values (..., L, 6) of the user's wrenches."""
     if not isinstance(wrench_axes, str) or wrench_axes not in ("world", "body"):
         raise _core.EvaluationError(f"wrench_axes={wrench_axes!r}: there are 'world' and 'body'")
     if wrenches is None:
@@ -199,7 +203,7 @@ def pushed(wrenches: Mapping[Any, Any] | None, wrench_axes: str) -> tuple[list[s
 
 
 def with_wrenches(pushes: tuple[list[str], bool, np.ndarray], more: list[tuple[str, np.ndarray]]) -> tuple[list[str], bool, np.ndarray]:
-    """What `pushed` gives, and wrenches (..., 6) by name in the same axes beside it."""
+    """Return the result of `pushed` with further wrenches (..., 6) by name in the same axes."""
     names, in_world, given = pushes
     each = [given[..., i, :] for i in range(len(names))] + [wrench for _, wrench in more]
     if not each:
@@ -209,8 +213,8 @@ def with_wrenches(pushes: tuple[list[str], bool, np.ndarray], more: list[tuple[s
 
 
 def loop_wrenches(model: Any, forces: Mapping[str, Any], q: Any, in_world: bool) -> tuple[list[tuple[str, np.ndarray]], np.ndarray]:
-    """The loops' forces by the names of the bodies and nodes that they act on, in the world's axes or the node's own; and the sum of those
-    on the base and nodes on it, about the world's origin in its axes."""
+    """Return the loops' forces by the names of the bodies and nodes on which they act, in the world's axes or the node's own; and the sum
+    of the forces on the base and nodes on it, about the world's origin in its axes."""
     moved, on_base = [], np.zeros(6)
     for name, pair in forces.items():
         for frame, wrench in zip(model.loops.ends_of(name), pair, strict=True):
@@ -233,31 +237,31 @@ def forces_of_scene(
     calls: _core.SceneCalls, model: Any, t: np.ndarray, q: np.ndarray, v: np.ndarray, own: np.ndarray, hinges: Any, axes: Any, about: Any,
     part: str,
 ) -> np.ndarray:  # fmt: skip
-    """Of a scene at K states: t (K,), q (K, nq), v (K, nv), its effects' own states (K, n)."""
+    """Return the forces of a scene at K states: t (K,), q (K, nq), v (K, nv), its effects' own states (K, n)."""
     rows, reaction = hinge_numbers(model, hinges), is_reaction(part)
     f, X = _core.scene_interbody_forces(calls, t, q, v, own, reaction)
     return in_axes(model, q, f[..., rows, :], X[..., rows, :, :], axes, about, t)
 
 
 def is_reaction(part: Any) -> bool:
-    """Whether a part that is asked for is the reaction. EvaluationError for one that is not there."""
+    """Check that the requested part is the reaction. EvaluationError for an unknown part."""
     if not isinstance(part, str) or part not in PARTS:
         raise _core.EvaluationError(f"part={part!r} of interbody forces: there are {', '.join(map(repr, PARTS))}")
     return part == "reaction"
 
 
 def refuse_state(hinges: Any) -> None:
-    """ModelError where a state stands in the place of names of hinges."""
+    """Raise ModelError for a state in place of names of hinges."""
     if (
         hasattr(hinges, "q")
         or isinstance(hinges, np.ndarray)
         or (isinstance(hinges, Sequence) and any(isinstance(x, (int, float)) for x in hinges))
     ):
-        raise _core.ModelError("the first argument names hinges, and numbers of a state are given: write interbody_forces(q=q, v=v)")
+        raise _core.ModelError("the first argument names hinges, but values of a state are given: write interbody_forces(q=q, v=v)")
 
 
 def hinge_numbers(model: Any, hinges: Any) -> Any:
-    """What picks the rows of these hinges: a number of one, a list of several."""
+    """Return the index of the rows of these hinges: a number for one, a list for several."""
     if hinges is None:
         return slice(None)
     if isinstance(hinges, str) or not isinstance(hinges, Sequence):
@@ -266,9 +270,9 @@ def hinge_numbers(model: Any, hinges: Any) -> Any:
 
 
 def in_axes(model: Any, q: Any, f: np.ndarray, X: np.ndarray, axes: Any, about: Any, t: Any = None) -> np.ndarray:
-    """Forces f (..., 6) of bodies in their axes about their origins, X (..., 4, 4) where these are, in other axes, about another point.
+    """Return forces f (..., 6) of bodies in their axes about their origins, X (..., 4, 4) their poses, in other axes, about another point.
 
-    With R, p of X, the axes A asked for and the point c:  (R_WA* (R n + (p - c) × R f);  R_WA* R f)
+    With R, p of X, the requested axes A and the point c:  (R_WA* (R n + (p - c) × R f);  R_WA* R f)
     """
     if isinstance(axes, str) and axes == "body" and about is None:
         return f

@@ -1,14 +1,14 @@
-"""Inverse dynamics on the loops: the forces of actuated coordinates that give a motion, and what the loops carry (docs/loops.md).
+"""Inverse dynamics on the loops: the forces of actuated coordinates that produce a motion, and the loops' forces (docs/loops.md).
 
 The tree needs T = ℳ v̇ + 𝒞 along its coordinates. With S the columns of 1 at actuated coordinates and P the orthogonal projector onto
-motions that keep every row, Q P = 0, loops carry whatever is in the range of Q*, which is that of 1 - P:
+motions that keep every row, Q P = 0, loops carry everything in the range of Q*, which is the range of 1 - P:
 
     T = S τ + Q*λ + r        P S τ + r = P T        τ = (P S)⁺ P T,   r = P T - P S τ,   λ = (Q*)⁺ (T - S τ - r)
 
-(..)⁺ the pseudo-inverse: of all forces that leave the least |r| those of the least |τ|, and then the least |λ|. r is zero along actuated
-coordinates, S* r = 0, and along no row, Q r = 0: a motion on the loops with the actuators at rest, along which nothing drives.
+(..)⁺ the pseudo-inverse: of all forces with the least |r| those with the least |τ|, and then the least |λ|. r is zero along actuated
+coordinates, S* r = 0, and along the rows, Q r = 0: a motion on the loops with the actuators at rest, which nothing drives.
 
-Derivatives where r = 0: τ = S* m, m the motion that keeps the rows with S S* m + Q*λ = T, so that
+Derivatives if r = 0: τ = S* m, m the motion that keeps the rows with S S* m + Q*λ = T, so that
 
     S S* δm + Q*δλ = δT - ∂(Q*λ)/∂q δq,   Q δm = -∂(Q m)/∂q δq
 """
@@ -31,23 +31,24 @@ from .linearization import listed
 from .loop_tangents import RANK
 
 FAR, STOPPED = 1e-6, 1e-13
-"""What is no state on the loops, as mobility has it; rad/s, m/s: what is slower is what rounding leaves of velocities that stopped."""
+"""Bound for a state on the loops, as in mobility; rad/s, m/s: slower velocities are rounding of velocities that stopped."""
 
 
 @dataclass(frozen=True)
 class ConstrainedForces:
-    """Generalized forces that give a model on its loops a motion, with a leading axis (B, ...) for batches.
+    """Generalized forces that produce a motion of a model on its loops, with a leading axis (B, ...) for batches.
 
     Attributes
     ----------
-    tau : (nv,) N m and N, zero where nothing is actuated; where several forces give the motion, those of the least Σ τ²
-    multipliers : (rows,) in the order of `loops.rows`: ℳ v̇ + 𝒞 = τ + Q*λ + residual; of the least Σ λ²
-    by_loop : the same by the loops' names, (rows of the loop,) each
-    forces : `LoopForce` by the loops' names
-    residual : (nv,) what no forces of these actuators give, the least: zero along actuated coordinates, and a motion on the loops
+    tau : (nv,) N m and N, zero at coordinates that are not actuated; of several solutions the one of least Σ τ²
+    multipliers : (rows,) in the order of `loops.rows`: ℳ v̇ + 𝒞 = τ + Q*λ + residual, the solution of least Σ λ²
+    by_loop : the same by the names of loops, (rows of the loop,) each
+    forces : `LoopForce` by the names of loops
+    residual : (nv,) forces that these actuators cannot produce, the least possible: zero along actuated coordinates, and a motion on the
+        loops
     unattained : names of coordinates with a residual beyond rounding, at any of the states
-    rank : () of Q
-    driven : () how many independent motions on the loops the actuators drive; there are nv - rank
+    rank : () rank of Q
+    driven : () number of independent motions on the loops that the actuators drive, of nv - rank
     """
 
     tau: np.ndarray
@@ -61,9 +62,9 @@ class ConstrainedForces:
 
 
 class ConstrainedForceDerivatives(NamedTuple):
-    """Derivatives of the forces of actuated coordinates, (nv, nv) or (B, nv, nv) each; rows of what is not actuated are zero.
+    """Derivatives of the forces of actuated coordinates, (nv, nv) or (B, nv, nv) each; rows of other coordinates are zero.
 
-    q : along coordinates, on ball and free hinges along quasi-velocities; of motions on the loops
+    q : along coordinates, on ball and free hinges along quasi-velocities; for motions on the loops
     v : by velocities
     vdot : by accelerations
     """
@@ -74,7 +75,7 @@ class ConstrainedForceDerivatives(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """What actuators give and loops carry of forces T (..., nv): τ, r, λ, the rank of Q and how many freedoms the actuators drive."""
+    """Split of forces T (..., nv) between actuators and loops: τ, r, λ, the rank of Q and the number of driven freedoms."""
 
     tau: np.ndarray
     residual: np.ndarray
@@ -84,7 +85,7 @@ class Carried(NamedTuple):
 
 
 def actuated_coordinates(model: Any, actuated: Any) -> np.ndarray:
-    """Which coordinates (nv,) are driven: by names of hinges, coordinates or patterns; all for None. ModelError for a name not there."""
+    """Return the driven coordinates (nv,), by names of hinges, coordinates or patterns; all for None. ModelError for an unknown name."""
     driven = np.ones(model.nv, bool)
     if actuated is not None:
         driven[:] = False
@@ -93,13 +94,13 @@ def actuated_coordinates(model: Any, actuated: Any) -> np.ndarray:
 
 
 def shared_out(Q: np.ndarray, T: np.ndarray, driven: np.ndarray) -> Carried:
-    """Forces T (..., nv) shared out between actuators and rows Q (..., rows, nv)."""
+    """Split forces T (..., nv) between actuators and rows Q (..., rows, nv)."""
     rows, nv = Q.shape[-2:]
     longest = np.linalg.norm(Q, axis=-1).max(axis=-1, initial=0.0)[..., None]
     longest = np.where(longest > 0, longest, 1.0)
     U, sigma, V = np.linalg.svd(Q / longest[..., None], full_matrices=False)
     kept = sigma > RANK
-    V = V * kept[..., None]  # an orthonormal basis of what Q* spans
+    V = V * kept[..., None]  # an orthonormal basis of the range of Q*
     free = T - _along(V, T)
     pushes = np.eye(nv)[:, driven] - np.swapaxes(V, -1, -2) @ V[..., driven]  # P S
     A, s, B = np.linalg.svd(pushes, full_matrices=False)
@@ -121,7 +122,7 @@ def _along(V: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def check_on_loops(model: Any, q: np.ndarray, v: np.ndarray | None = None, vdot: np.ndarray | None = None) -> None:
-    """ModelError for a state that is off the loops, moves off them or accelerates off them, with the row, and of a batch the state."""
+    """Raise ModelError for a state that is off the loops, moves or accelerates off them, with the row, and in a batch the state."""
     loops = model.loops
     if not loops.rows:
         return
@@ -146,7 +147,8 @@ def check_on_loops(model: Any, q: np.ndarray, v: np.ndarray | None = None, vdot:
 
 
 def end_forces(model: Any, q: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-    """What loops put on b and on a (..., loops, 2, 6), each in its axes about its origin, where rows carry λ: A*λ; zeros of couplings."""
+    """Return the forces of loops on b and on a (..., loops, 2, 6), each in its axes about its origin, for rows with λ: A*λ; zeros for
+    couplings."""
     loops, ends = model.loops, model.loops.ends
     out = np.zeros((*multipliers.shape[:-1], len(loops), 2, 6))
     if not ends:
@@ -168,7 +170,7 @@ def end_forces(model: Any, q: np.ndarray, multipliers: np.ndarray) -> np.ndarray
 
 
 class ConstrainedInverseCalls:
-    """Inverse dynamics with the loops' forces in it."""
+    """Inverse dynamics including the loops' forces."""
 
     nv: int
     loops: Any
@@ -177,19 +179,19 @@ class ConstrainedInverseCalls:
         self, q=None, v=None, vdot=None, *, actuated: Any = None, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world",
         tolerance: float = TOLERANCE,
     ) -> ConstrainedForces:  # fmt: skip
-        """Inverse dynamics on the loops: forces τ of the actuated coordinates that give v̇, the loops' forces λ, and what is not attainable.
+        """Return the forces τ of the actuated coordinates that produce v̇ on the loops, the loops' forces λ, and the unattainable part.
 
-        ℳ v̇ + 𝒞 = τ + Q*λ + r,   S* r = 0,   Q r = 0: with more actuators than freedoms τ is the one of the least Σ τ² (N m and N), with
-        fewer r is the least that any forces of these actuators leave. Exactly as many, at a state where they describe the motion: τ is
-        the only one, X*(ℳ v̇ + 𝒞) with `soa.embedded(actuated)`.
+        ℳ v̇ + 𝒞 = τ + Q*λ + r, S* r = 0, Q r = 0: with more actuators than freedoms τ has the least Σ τ² (N m and N), with fewer r is the
+        least that any forces of these actuators leave. With exactly as many, at a state where they describe the motion, τ is unique, X*(ℳ
+        v̇ + 𝒞) with `soa.embedded(actuated)`.
 
         Parameters
         ----------
         q, v, vdot : (nq,), (nv,), (nv,), each with an optional leading batch axis; on the loops
-            `assemble(q, v)` finds q and v, `loops.acceleration(q, v, vdot)` v̇. Zero where v and vdot are left out.
-        actuated : names of hinges, coordinates or patterns, or a list of them, that can be driven; None: all
+            `assemble(q, v)` finds q and v, `loops.acceleration(q, v, vdot)` v̇. Default: v and vdot zero.
+        actuated : names of hinges, coordinates or patterns, or a list of them, of driven coordinates; None: all
         wrenches, wrench_axes : as in `interbody_forces`
-        tolerance : what may be left, as a part of the largest force
+        tolerance : largest residual, relative to the largest force
 
         Returns
         -------
@@ -198,11 +200,11 @@ class ConstrainedInverseCalls:
         Raises
         ------
         ModelError
-            A state that is off the loops, moves or accelerates off them, by the row; names that are not there.
+            A state that is off the loops, moves or accelerates off them, by the row; unknown names.
         EvaluationError
-            A tolerance that is none.
+            An invalid tolerance.
 
-        At a singular state loops carry what their rows there carry. Cost: O(N), and dense factors of Q, rows² · nv.
+        At a singular state loops carry what their rows carry there. Cost: O(N), and dense factors of Q, rows² · nv.
         Source: the equations of motion with loops, A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11; minimum norm and
         projectors, G. Golub, C. Van Loan, Matrix Computations, 2013, 5.5.
 
@@ -232,12 +234,12 @@ class ConstrainedInverseCalls:
     def constrained_inverse_dynamics_derivatives(
         self, q=None, v=None, vdot=None, *, actuated: Any = None, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world",
     ) -> ConstrainedForceDerivatives:  # fmt: skip
-        """Derivatives of τ of `constrained_inverse_dynamics`, whose arguments and errors these are; exact.
+        """Return exact derivatives of τ of `constrained_inverse_dynamics`; arguments and errors are the same.
 
-        They are of states on the loops: along q multiply by motions that keep the rows (`mobility(q).freedoms`), δv and δv̇ beside them
-        likewise as Q δv + ∂(Qv)/∂q δq = 0. Cost: nv times the rows, and dense factors of Q.
+        They apply to states on the loops: along q multiply by motions that keep the rows (`mobility(q).freedoms`), with δv and δv̇
+        likewise, Q δv + ∂(Qv)/∂q δq = 0. Cost: nv times the rows, and dense factors of Q.
 
-        EvaluationError where fewer freedoms are driven than there are: what is left then is a choice, and no function to differentiate.
+        EvaluationError if not all freedoms are driven: the rest is then a choice, and not a differentiable function.
 
         Examples
         --------
@@ -272,8 +274,8 @@ class ConstrainedInverseCalls:
 
 
 def beyond(model: Any, left: np.ndarray, needed: np.ndarray, f: np.ndarray, pushes: np.ndarray, tolerance: Any) -> tuple[str, ...]:
-    """Names of coordinates at which something is left, beyond a part of the largest force: f of hinges, weights, what pushes."""
-    weight = model.mass * float(np.linalg.norm(model.gravity))  # what balances, where hinges carry nothing
+    """Return names of coordinates with a residual beyond a part of the largest force: f of hinges, weights, wrenches."""
+    weight = model.mass * float(np.linalg.norm(model.gravity))  # the balancing force, if hinges carry nothing
     pushed_by = np.abs(pushes).max(initial=0.0, axis=(-2, -1))
     carried = np.maximum(np.abs(f).max(initial=0.0, axis=(-2, -1)), np.abs(needed).max(initial=0.0, axis=-1))
     size = np.maximum(carried, np.maximum(weight, pushed_by))[..., None]
@@ -285,11 +287,11 @@ def beyond(model: Any, left: np.ndarray, needed: np.ndarray, f: np.ndarray, push
 def _asked(
     model: Any, q: Any, v: Any, vdot: Any, wrenches: Any, wrench_axes: Any
 ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], tuple[int, ...], tuple[Any, Any, np.ndarray]]:  # fmt: skip
-    """A motion on the loops, checked, the batch's shape, and what pushes: nodes, whether in world axes, wrenches."""
+    """Return a checked motion on the loops, the batch's shape, and wrenches: nodes, whether in world axes, values."""
     q, v = at_state(model, q, v)
     vdot = np.zeros(model.nv) if vdot is None else vdot
     q, v, vdot = (np.asarray(_core.real_array(x, name), float) for name, x in (("q", q), ("v", v), ("vdot", vdot)))
-    model.inverse_dynamics(q, v, vdot)  # refuses what does not fit
+    model.inverse_dynamics(q, v, vdot)  # refuses arguments that do not fit
     pushes = pushed(wrenches, wrench_axes)
     check_on_loops(model, q, v, vdot)
     return (q, v, vdot), np.broadcast_shapes(q.shape[:-1], v.shape[:-1], vdot.shape[:-1]), pushes

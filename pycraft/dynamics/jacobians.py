@@ -1,4 +1,4 @@
-"""Jacobians in other axes, about other points, against other frames than the core's: see `DirectCalls.jacobian`."""
+"""Jacobians in other axes, about other points, relative to other frames than the core's: see `DirectCalls.jacobian`."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ AXES = ("body", "aligned", "world")
 
 
 def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: str | None, precision: str | int) -> np.ndarray:
-    """J (6, nv) or (B, 6, nv), of the velocity (ω; v) of `frame` (f) against `relative_to` (o).
+    """Return J (6, nv) or (B, 6, nv), of the velocity (ω; v) of `frame` (f) relative to `relative_to` (o).
 
     With R, p the pose of f in o, and the core's 𝒥_f and 𝒥_o, each in its own axes about its own origin:
 
-      body     𝒥 = 𝒥_f - (R* ω_o; R* (v_o + ω_o × p))        what o carries along is taken off
-      aligned  (R ω; R v) of it
+      body     𝒥 = 𝒥_f - (R* ω_o; R* (v_o + ω_o × p))        the motion of o is subtracted
+      aligned  (R ω; R v) of the body form
       world    (R ω; R v + p × R ω)
 
-    O(N). Raises EvaluationError for axes that are not there.
+    O(N). Raises EvaluationError for unknown axes.
     """
     if not isinstance(axes, str) or axes not in AXES:
         raise _core.EvaluationError(f"axes={axes!r} of a Jacobian: there are {', '.join(map(repr, AXES))}")
@@ -36,7 +36,7 @@ def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: st
         R, p = R_o @ R, np.einsum("...ij,...j->...i", R_o, p - X_o[..., :3, 3])
         carried = J_o[..., 3:, :] - _cross(p, J_o[..., :3, :])
         J = J - _turned(np.swapaxes(R, -1, -2), np.concatenate([J_o[..., :3, :], carried], axis=-2))
-        # a coordinate that moves both moves them as one body: exactly nothing, where the difference is rounding
+        # a coordinate that moves both moves them as one body: exactly zero, although the difference is rounding
         J[..., _moves(core_f) & _moves(J_o)] = 0
     if axes == "body":
         return J
@@ -47,15 +47,15 @@ def resolved_jacobian(model: Any, frame: str, q: Any, axes: str, relative_to: st
 
 
 def _turned(R: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """(R ω; R v) of every column."""
+    """Return (R ω; R v) of every column."""
     return np.concatenate([R @ J[..., :3, :], R @ J[..., 3:, :]], axis=-2)
 
 
 def _moves(J: np.ndarray) -> np.ndarray:
-    """Which coordinates (nv,) move the frame: columns off the path to the base are zero, the others never."""
+    """Return which coordinates (nv,) move the frame: columns off the path to the base are zero, the others never."""
     return np.asarray(J.reshape(-1, J.shape[-1]).any(axis=0))
 
 
 def _cross(p: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """p × each column, (..., 3) and (..., 3, n)."""
+    """Return p × each column, (..., 3) and (..., 3, n)."""
     return np.cross(p[..., None, :], np.swapaxes(columns, -1, -2)).swapaxes(-1, -2)

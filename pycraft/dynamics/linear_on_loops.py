@@ -1,4 +1,4 @@
-"""Linear models of motion on the loops (docs/loops.md): the tree's, on the tangent space of states that keep every row."""
+"""Linear models of motion on the loops (docs/loops.md): the tree's model on the tangent space of states that keep every row."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .linearization import linear_model, listed
 from .loop_tangents import KeptRows, TreeDerivatives, kept_rows, on_loops
 
 FAR, STOPPED = 1e-6, 1e-13
-"""What is no state on the loops, as mobility has it; rad/s, m/s: what is slower is what rounding leaves of velocities that stopped."""
+"""Bound for a state on the loops, as in mobility; rad/s, m/s: slower velocities are rounding of velocities that stopped."""
 
 
 def independent_numbers(model: Any, names: Any) -> list[int] | None:
-    """Numbers of coordinates, in the order of these names; None where they are to be chosen: none are named, by None or an empty list."""
+    """Return the numbers of coordinates, in the order of these names; None if they are to be chosen (no names, None or an empty list)."""
     if names is None:
         return None
     found = [j for name in listed(names, "independent") for j in _core.coordinates_named(model, [name], "independent")]
@@ -29,7 +29,7 @@ def independent_numbers(model: Any, names: Any) -> list[int] | None:
 def linear_model_on_loops(
     rows: KeptRows, tree: TreeDerivatives, inputs: tuple[str, ...], outputs: Any, independent: list[int] | None, t: float = 0.0
 ) -> LinearModel:
-    """In independent coordinates of displacements and velocities, with what else there is; `tangent` has those of the tree by them."""
+    """Return the model in independent coordinates of displacements and velocities, and other states; `tangent` maps them to the tree's."""
     model, nv, k = rows.model, rows.model.nv, len(tree.rates)
     tangents, (along_q, along_rest, along_inputs) = on_loops(rows, tree, independent)
     i, j, own = tangents.displacements, tangents.velocities, list(range(nv, k))
@@ -49,7 +49,7 @@ def linear_model_on_loops(
 
 
 def chosen_numbers(of: LinearModel) -> list[int]:
-    """The independent coordinates of its displacements, those of velocities first."""
+    """Return the independent coordinates of its displacements, those of velocities first."""
     numbers = {name: j for j, name in enumerate(of.model.coordinate_names)}
     found = {part: [numbers[name[2:]] for name in of.states if name.startswith(part)] for part in ("q.", "v.")}
     return [*found["v."], *(j for j in found["q."] if j not in found["v."])]
@@ -88,7 +88,7 @@ def _at(
 
 
 def _check_on_loops(model: Any, q: np.ndarray, v: np.ndarray) -> None:
-    """ModelError for a state that is off the loops, or moves off them, with the row."""
+    """Raise ModelError for a state that is off the loops, or moves off them, with the row."""
     rows, sizes = model.loops.rows, model.loops.sizes(q)
     fastest = max(np.abs(v).max(initial=0.0), STOPPED / FAR)
     for what, off in (

@@ -14,7 +14,7 @@ from ..state import at_state
 from .displacements import brackets, turning
 
 OUTPUTS = ("q", "v", "vdot", "position", "rotation", "velocity")
-"""What may be asked for, each of something: coordinates, then bodies and nodes."""
+"""Kinds of outputs: of coordinates, then of bodies and nodes."""
 AXES = {"position": ("x", "y", "z"), "rotation": ("rx", "ry", "rz"), "velocity": ("rx", "ry", "rz", "x", "y", "z")}
 
 
@@ -29,29 +29,29 @@ class LinearizationCalls:
         self, q=None, v=None, tau=None, *, inputs: Any = None, outputs: Any = None, form: str = "fast", precision: str = "double",
         dt: float | None = None, method: str = "zoh", loops: bool = False, independent: Any = None,
     ) -> LinearModel:  # fmt: skip
-        """The linear model of v̇ = forward_dynamics(q, v, τ) near a state, or near each of a batch: δẋ = A δx + B δu, x = (q, v).
+        """Return the linear model of v̇ = forward_dynamics(q, v, τ) near a state, or near each of a batch: δẋ = A δx + B δu, x = (q, v).
 
-        δq are displacements on the group, as `integrate` takes them, from the motion that passes through the state: with v₀ the velocity
-        there, δq̇ = δv - ad(v₀) δq, where ad is zero but on ball and free hinges (the bracket of their twists). So
+        δq are displacements on the group, as `integrate` takes them, from the motion through the state: with v₀ the velocity there, δq̇ =
+        δv - ad(v₀) δq, where ad is nonzero only on ball and free hinges (the bracket of their twists). So
 
             A = [[-ad(v₀), 1], [∂v̇/∂q, ∂v̇/∂v]],   B = [[0], [(ℳ + J)⁻¹]],
 
-        exact by the derivatives of forward dynamics, gravity and rotor inertia included. O(nv²) numbers in O(N · depth).
+        exact by the derivatives of forward dynamics, gravity and rotor inertia included. O(nv²) entries in O(N · depth).
 
         Parameters
         ----------
-        q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis; what is left out as in `forward_dynamics`
+        q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis; defaults as in `forward_dynamics`
         inputs : names of hinges, coordinates or patterns, or a list of them, whose generalized forces are inputs; None: all
         outputs : list of names; None: the states themselves
             "q.elbow", "v.elbow", "vdot.elbow" of coordinates; "position.hand" (3 rows, world axes), "rotation.hand" (3, a small rotation,
             the frame's axes), "velocity.hand" (6, the frame's axes, angular first) of bodies and nodes.
         form, precision : as in `forward_dynamics`
-        dt, method : s, where the model is to be discrete, and how (`LinearModel.discrete`)
-        loops : whether the loops are kept: of `constrained_dynamics`, at a state on them, in independent coordinates (docs/loops.md)
-            States are then the displacements and velocities of as many coordinates as there are freedoms; where rows are of velocities
-            (rolling), of more displacements than velocities.
-        independent : names of the coordinates whose displacements are states, with loops=True; None or an empty list: those that
-            tell the others best
+        dt, method : s, for a discrete model, and its method (`LinearModel.discrete`)
+        loops : whether to keep the loops: linearize `constrained_dynamics`, at a state on them, in independent coordinates (docs/loops.md)
+            States are then the displacements and velocities of as many coordinates as there are freedoms; if some rows are of velocities
+            (rolling), there are more displacements than velocities.
+        independent : names of the coordinates with displacements as states, with loops=True; None or an empty list: those that determine
+            the others best
 
         Returns
         -------
@@ -61,9 +61,9 @@ class LinearizationCalls:
         Raises
         ------
         ModelError
-            Names that are not there; with loops a state off them, coordinates that do not tell where the others are.
+            Unknown names; with loops a state off them, coordinates that do not determine the others.
         EvaluationError
-            With loops: a singular state; a coupling by a function whose coordinates move.
+            With loops: a singular state; a coupling by a function of coordinates that move.
         SingularHingeError
             As `forward_dynamics`.
 
@@ -91,7 +91,7 @@ class LinearizationCalls:
             made = linearize_on_loops(model, q, v, tau, chosen, named, outputs, independent, how)
             return made if dt is None else made.discrete(dt, method)
         if independent is not None:
-            raise _core.ModelError("independent: coordinates of a tree are all independent; with loops=True its loops are kept")
+            raise _core.ModelError("independent: coordinates of a tree are all independent; use loops=True to keep its loops")
         dq, dv, inverse = self.forward_dynamics_derivatives(q, v, tau, **how)
         vdot = self.forward_dynamics(q, v, tau, **how)
         v = np.asarray(getattr(v, "v", v), float)
@@ -103,9 +103,9 @@ def linear_model(
     model: Any, q: Any, v: np.ndarray, rates: np.ndarray, along_q: np.ndarray, along_rest: np.ndarray, along_inputs: np.ndarray,
     inputs: tuple[str, ...], outputs: Any, states: tuple[str, ...], t: float = 0.0, known: Sequence[int] = (),
 ) -> LinearModel:  # fmt: skip
-    """Of the rates of (v, y), y what else there is (..., k), and their derivatives along displacements, along (v, y) and along inputs.
+    """Return the model from the rates of (v, y), y other states (..., k), and their derivatives along displacements, (v, y) and inputs.
 
-    known : coordinates that go where they are told, whose displacements stay what they are
+    known : coordinates with prescribed motion; their displacements stay constant
     """
     q = np.asarray(getattr(q, "q", q), float)
     nv, k = model.nv, rates.shape[-1]
@@ -125,7 +125,7 @@ def linear_model(
 
 
 def listed(names: Any, what: str) -> list[str]:
-    """One name or several, handles included, as a list. ModelError for what is no name."""
+    """Return one name or several, handles included, as a list. ModelError for an invalid name."""
     found = [getattr(one, "name", one) for one in several(names)]
     for name in found:
         if not isinstance(name, str):
@@ -134,7 +134,7 @@ def listed(names: Any, what: str) -> list[str]:
 
 
 def units_of(model: Any, own: int) -> list[str]:
-    """Units of the states: displacements, velocities, and what effects have of their own, of which none are known."""
+    """Return the units of the states: displacements, velocities, and the effects' own states, of unknown units."""
     along = []
     for hinge in model.hinges.values():
         for subhinge in hinge.subhinges:
@@ -146,7 +146,7 @@ def units_of(model: Any, own: int) -> list[str]:
 def rows_of(
     model: Any, q: np.ndarray, v: np.ndarray, A: np.ndarray, B: np.ndarray, outputs: Any, states: tuple[str, ...]
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    """C, D and the names of the outputs asked for."""
+    """Return C, D and the names of the requested outputs."""
     n, m, batch = A.shape[-1], B.shape[-1], A.shape[:-2]
     if outputs is None:
         return np.broadcast_to(np.eye(n), (*batch, n, n)).copy(), np.zeros((*batch, n, m)), states
@@ -155,7 +155,7 @@ def rows_of(
     for name in listed(outputs, "outputs"):
         what, _, of = name.partition(".")
         if what not in (*OUTPUTS, "state") or not of:
-            raise _core.ModelError(f"outputs: {name!r} is none; there are {', '.join(f'{w}.<name>' for w in OUTPUTS)}")
+            raise _core.ModelError(f"outputs: unknown output {name!r}; there are {', '.join(f'{w}.<name>' for w in OUTPUTS)}")
         C, D = np.zeros((*batch, 1, n)), np.zeros((*batch, 1, m))
         if what == "state" or what in ("q", "v", "vdot"):
             row = _row_of(model, name, what, of, states)

@@ -1,4 +1,4 @@
-"""Logged motion and forces: arrays, runs and tables as arrays, checked."""
+"""Logged motion and forces: arrays, runs and tables, as checked arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..state import at_state, names_of_q
 
 
 def logged_motion(model: Any, q: Any, v: Any, vdot: Any, tau: Any) -> tuple[np.ndarray, ...]:
-    """q, v, v̇, T as (K, n), finite."""
+    """Return q, v, v̇, T as (K, n), finite."""
     if hasattr(q, "forces") and hasattr(q, "vdot"):
         q, v, vdot, tau = q.q, q.v, q.vdot, sum(_of_effects(q.forces, tau))
     elif hasattr(q, "columns"):
@@ -38,14 +38,14 @@ def logged_motion(model: Any, q: Any, v: Any, vdot: Any, tau: Any) -> tuple[np.n
     counts = {len(x) for x in arrays}
     if len(counts) > 1:
         raise _core.ModelError(
-            f"identify: q, v, vdot and tau have {', '.join(str(len(x)) for x in arrays)} rows; there is one of each a state"
+            f"identify: q, v, vdot and tau have {', '.join(str(len(x)) for x in arrays)} rows; give one of each per state"
         )
     return tuple(arrays)
 
 
 def _of_effects(forces: Any, names: Any) -> list[np.ndarray]:
     if names is None:
-        raise _core.ModelError(f"identify: of a run tau= says which effects' forces were measured, of {', '.join(forces)}")
+        raise _core.ModelError(f"identify: for a run, tau= names the effects with measured forces, among {', '.join(forces)}")
     wanted = [names] if isinstance(names, str) else listed(names, "tau")
     for name in wanted:
         if name not in forces:
@@ -54,7 +54,7 @@ def _of_effects(forces: Any, names: Any) -> list[np.ndarray]:
 
 
 def _of_table(model: Any, table: Any, names: Any) -> tuple[np.ndarray, ...]:
-    """Columns by coordinate, in whatever order the table has them."""
+    """Return columns by coordinate, in any order of the table."""
     columns = [str(name) for name in table.columns]
 
     def by_name(start: str, of: Sequence[str] = model.coordinate_names) -> np.ndarray:

@@ -2,13 +2,13 @@
 
 A state is (q, v) with r(q) = 0 and Q v = 0. Along displacements δq on the group and δv,
 
-    Q_p δq = 0,   Q δv + ∂(Qv)/∂q δq = 0                 Q_p the rows of positions, Q all of them, those of velocities (rolling) too
+    Q_p δq = 0,   Q δv + ∂(Qv)/∂q δq = 0                 Q_p the rows of positions, Q all of them, including rows of velocities (rolling)
 
-so that with independent coordinates i of displacements and j of velocities, of which without rows of velocities j = i,
+so that with independent coordinates i of displacements and j of velocities (j = i without rows of velocities),
 
     δq = X δq_i,   δv = Y δq_i + Z δv_j,    Q_p X = 0,   Q Z = 0,   Q Y = -∂(Qv)/∂q X
 
-All is by orthogonal factors of Q, of which redundant rows may be part.
+Everything is computed by orthogonal factors of Q, which may have redundant rows.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ import numpy as np
 from .. import _core
 
 RANK = 1e-8
-"""Of singular values of Q over its longest row, as mobility has it."""
+"""Least singular value of Q that counts, relative to its longest row, as in mobility."""
 CLEAR = 1e-6
-"""Between RANK and this a rank is not sure: ∂λ grows as one over the square of what is left there, and digits are lost as that."""
+"""Between RANK and this a rank is doubtful: ∂λ grows with the inverse square of the singular value, and loses digits accordingly."""
 SMOOTH = 1e-6
-"""What may be left of what asks for another rank beside a state, as a part of what it is made of."""
+"""Tolerance for the test of a different rank beside a state, relative to the terms of its sum."""
 
 
 @dataclass(frozen=True)
 class KeptRows:
-    """Rows that are kept at a state: of some loops, then of coordinates that are held or go as they are told.
+    """Rows that are kept at a state: of some loops, then of coordinates that are held or prescribed.
 
     Q : (m, nv)
     chosen : numbers of the loops' rows among all rows of the model
@@ -50,11 +50,11 @@ class KeptRows:
     displacements: np.ndarray
 
     def multipliers(self, forces: np.ndarray) -> np.ndarray:
-        """λ, the least, (m,), with Q*λ nearest to these forces."""
+        """Return the least multipliers λ (m,) with Q*λ nearest to these forces."""
         return np.linalg.lstsq(self.Q.T, forces, rcond=RANK)[0] if self.Q.size else np.zeros(len(self.Q))
 
     def derivatives(self, v: np.ndarray, vdot: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q, ∂(Q̇v)/∂v, (m, nv) each, and ∂(Q*λ)/∂q (nv, nv); v̇ and λ are held."""
+        """Return ∂(Qv)/∂q, ∂(Q v̇ + Q̇v)/∂q, ∂(Q̇v)/∂v, (m, nv) each, and ∂(Q*λ)/∂q (nv, nv), at constant v̇ and λ."""
         loops, nv, count = self.model.loops._core, self.model.nv, len(self.chosen)
         whole = np.zeros(len(self.model.loops.rows))
         whole[self.chosen] = multipliers[:count]
@@ -65,7 +65,7 @@ class KeptRows:
 
 
 def kept_rows(model: Any, q: np.ndarray, loops: Iterable[str], held: Iterable[int] = ()) -> KeptRows:
-    """Of these loops and coordinates. EvaluationError at a singular state: where rows hang together that do not beside it."""
+    """Return the rows of these loops and coordinates. EvaluationError at a singular state: rows that are dependent only there."""
     of_loop = [model.loops[name].slice for name in loops]
     chosen = np.concatenate([np.zeros(0, int), *(np.arange(one.start, one.stop) for one in of_loop)])
     fixed = list(held)
@@ -77,7 +77,7 @@ def kept_rows(model: Any, q: np.ndarray, loops: Iterable[str], held: Iterable[in
     if least < CLEAR:
         raise _core.EvaluationError(
             f"{model.name!r} is within {least:.1e} of a singular state of its loops (the smallest singular value of Q over its longest "
-            "row): derivatives are not sure there; take a state further off"
+            "row): derivatives are unreliable there; move the state away from it"
         )
     rows = KeptRows(model, np.asarray(q, float), Q, chosen, of_positions, names, null, displacements)
     _refuse_singular(rows, left)
@@ -89,7 +89,7 @@ def kept_rows(model: Any, q: np.ndarray, loops: Iterable[str], held: Iterable[in
 
 
 def _null_spaces(Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Orthonormal bases of μ with Q*μ = 0 and of x with Qx = 0, and the smallest singular value that counts, over the longest row."""
+    """Return orthonormal bases of μ with Q*μ = 0 and of x with Qx = 0, and the least singular value that counts, over the longest row."""
     longest = np.linalg.norm(Q, axis=1).max(initial=0)
     left, values, right = np.linalg.svd(Q / longest if longest else Q)
     rank = int((values > RANK).sum())
@@ -97,7 +97,7 @@ def _null_spaces(Q: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def _refuse_singular(rows: KeptRows, left: np.ndarray) -> None:
-    """Rows with Q*μ = 0 hang together beside the state, too, where μ*∂Q N = 0 along displacements: asked of one μ drawn at random."""
+    """Check that rows with Q*μ = 0 stay dependent beside the state: μ*∂Q N = 0 along displacements, for one μ drawn at random."""
     if not left.size or not rows.displacements.size:
         return
     rng = np.random.default_rng(0)
@@ -109,7 +109,7 @@ def _refuse_singular(rows: KeptRows, left: np.ndarray) -> None:
         part = np.abs(mu) * np.abs(change).max(axis=1)
         named = ", ".join(repr(rows.names[i]) for i in np.flatnonzero(part > 1e-6 * part.max()))
         raise _core.EvaluationError(
-            f"{rows.model.name!r} is at a singular state of its loops, where {named} hang together and do not beside it: no "
+            f"{rows.model.name!r} is at a singular state of its loops, where {named} are dependent, but not beside it: "
             "derivatives are there; take a state beside it, or hold a coordinate that tells its branches apart"
         )
 
@@ -119,9 +119,9 @@ def _refuse_singular(rows: KeptRows, left: np.ndarray) -> None:
 
 @dataclass(frozen=True)
 class LoopTangents:
-    """The tangent space of states on the loops: X, Y, Z of this module's head.
+    """The tangent space of states on the loops: X, Y, Z in the equations of this module.
 
-    displacements, velocities : numbers of the coordinates i and j, in the order in which they were given, else the model's
+    displacements, velocities : numbers of the coordinates i and j, in the order given, else in the order of the model
     """
 
     displacements: list[int]
@@ -132,11 +132,11 @@ class LoopTangents:
 
 
 def loop_tangents(rows: KeptRows, slip: np.ndarray, independent: list[int] | None) -> LoopTangents:
-    """Of rows with ∂(Qv)/∂q = slip, in coordinates of these numbers, or that are chosen; velocities in the first of them that will do."""
+    """Return the tangent space for rows with ∂(Qv)/∂q = slip, in these coordinates or chosen ones; velocities in the first that suffice."""
     N, P = rows.null, rows.displacements
     if independent is None:
         j = _pivots(N)
-        rest = P - P @ np.linalg.lstsq(P[j], P[j], rcond=None)[0] if j else P  # what does not move those
+        rest = P - P @ np.linalg.lstsq(P[j], P[j], rcond=None)[0] if j else P  # the part that does not move those
         i = sorted({*j, *_pivots(rest, P.shape[1] - len(j))})
     else:
         i = _checked(rows, independent)
@@ -148,14 +148,14 @@ def loop_tangents(rows: KeptRows, slip: np.ndarray, independent: list[int] | Non
 
 
 def _by(basis: np.ndarray, chosen: list[int]) -> np.ndarray:
-    """The basis of the same space that is 1 at these coordinates."""
+    """Return the basis of the same space that is 1 at these coordinates."""
     out = np.linalg.solve(basis[chosen].T, basis.T).T if chosen else basis[:, :0]
     out[chosen] = np.eye(len(chosen))
     return out
 
 
 def _pivots(basis: np.ndarray, count: int | None = None) -> list[int]:
-    """The coordinates of a basis (nv, f) that tell all of it best, by a factor with column pivoting."""
+    """Return the coordinates that determine a basis (nv, f) best, by a factorization with column pivoting."""
     from scipy.linalg import qr  # SciPy takes a quarter of a second to import
 
     if not basis.size:
@@ -165,7 +165,7 @@ def _pivots(basis: np.ndarray, count: int | None = None) -> list[int]:
 
 
 def _first_of(chosen: list[int], basis: np.ndarray) -> list[int]:
-    """The first of these coordinates that tell all of a basis."""
+    """Return the first of these coordinates that determine the whole basis."""
     found: list[int] = []
     for i in chosen:
         if len(found) < basis.shape[1] and np.linalg.matrix_rank(basis[[*found, i]], tol=RANK) > len(found):
@@ -179,7 +179,7 @@ def _checked(rows: KeptRows, found: list[int]) -> list[int]:
         good = [names[i] for i in _pivots(P)]
         raise _core.ModelError(
             f"independent: displacements of {rows.model.name!r} on its loops have {P.shape[1]} coordinate(s), and "
-            f"{[names[i] for i in found]} do not tell where the others are at this state; {good} do"
+            f"{[names[i] for i in found]} do not determine the others at this state; {good} do"
         )
     return found
 
@@ -189,7 +189,8 @@ def _checked(rows: KeptRows, found: list[int]) -> list[int]:
 
 @dataclass(frozen=True)
 class TreeDerivatives:
-    """Of A ż = g + (Q*λ, 0), z = (v, what else there is): A (k, k), ∂g along displacements, along z and along inputs, at this z and ż."""
+    """Derivatives of A ż = g + (Q*λ, 0), z = (v, other states): A (k, k), ∂g along displacements, along z and along inputs, at this z and
+    ż."""
 
     mass: np.ndarray
     along_q: np.ndarray
@@ -201,7 +202,7 @@ class TreeDerivatives:
 
 
 def on_loops(rows: KeptRows, tree: TreeDerivatives, independent: list[int] | None) -> tuple[LoopTangents, list[np.ndarray]]:
-    """The tangent space and ∂ż along δq_i, along (δv_j, the rest) and along inputs.
+    """Return the tangent space and ∂ż along δq_i, along (δv_j, the rest) and along inputs.
 
     ℳ δv̇ - Q*δλ = ∂g + ∂(Q*λ)/∂q δq,   Q δv̇ = -∂(Q v̇ + Q̇v)/∂q δq - ∂(Q̇v)/∂v δv:   with the null space N of Q
 

@@ -1,4 +1,4 @@
-"""Direct calls of what nodes feel: the operational-space inertia Λ and its inverse."""
+"""Direct calls for nodes: the operational-space inertia Λ and its inverse."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ class OperationalSpaceCalls(DirectCalls):
         self, frame: str | Sequence[str], q=None, *, form: str = "fast", precision: str | int = "double", on_singular: str = "raise",
         damping: float = 0.02, threads: int = 1, out=None,
     ) -> np.ndarray:  # fmt: skip
-        """Λ = (B*ΩB)⁻¹ = (𝒥(ℳ + J)⁻¹𝒥*)⁻¹ of bodies or nodes, by name: what resists accelerations there, (6, 6) or (B, 6, 6).
+        """Return Λ = (B*ΩB)⁻¹ = (𝒥(ℳ + J)⁻¹𝒥*)⁻¹ of bodies or nodes, by name: the inertia at these frames, (6, 6) or (B, 6, 6).
 
-        In each frame's own axes about its origin, angular first, as `jacobian` has it; of m names (6 m, 6 m), in their order. One sweep
-        over all bodies and one along the way from each frame to the base: O(N + m² depth). `soa.Lambda(frame)` is the same as an
-        operator, and with directions= that of fewer directions. `form` is that of the sweep: in other forms and
-        precisions than these the operators compute it, and so they do where kernels are not sure, near singular poses.
+        In each frame's own axes about its origin, angular first, as in `jacobian`; for m names (6 m, 6 m), in their order. One sweep over
+        all bodies and one along the path from each frame to the base: O(N + m² depth). `soa.Lambda(frame)` is the same as an operator, and
+        accepts directions=. `form` is the form of the sweep: in other forms and precisions the operators compute it, and also near singular
+        poses, where kernels are unreliable.
 
-        on_singular, damping : what becomes of states at which the frames cannot move in every direction, as in `task_space`: "raise"
-        refuses them by number, "nan" has NaN there, "damped" the damped inertia of the task space at every state, in "fast" and double.
+        on_singular, damping : treatment of states at which the frames cannot move in every direction, as in `task_space`: "raise" refuses
+        them by number, "nan" returns NaN there, "damped" the damped inertia of the task space at every state, in "fast" and double.
 
-        SingularOperatorError where the frames cannot move in every direction, as of an arm of fewer than six hinges, with those directions;
-        SingularHingeError as in forward_dynamics; ModelError where no body or node has the name, or where it is fixed to the base.
+        SingularOperatorError if the frames cannot move in every direction, as for an arm of fewer than six hinges, with the lost
+        directions; SingularHingeError as in forward_dynamics; ModelError for an unknown body or node, or one fixed to the base.
 
         Examples
         --------
@@ -58,9 +58,9 @@ class OperationalSpaceCalls(DirectCalls):
     def operational_space_compliance(
         self, frame: str | Sequence[str], q=None, *, form: str = "fast", precision: str | int = "double", threads: int = 1, out=None
     ) -> np.ndarray:
-        """B*ΩB = 𝒥(ℳ + J)⁻¹𝒥* of bodies or nodes, by name: accelerations there by forces there, (6, 6) or (B, 6, 6).
+        """Return B*ΩB = 𝒥(ℳ + J)⁻¹𝒥* of bodies or nodes, by name: accelerations there by forces there, (6, 6) or (B, 6, 6).
 
-        As `operational_space_inertia`, whose inverse it is, and there also where that has none.
+        The inverse of `operational_space_inertia`; it also exists where that does not.
 
         Examples
         --------
@@ -74,7 +74,7 @@ class OperationalSpaceCalls(DirectCalls):
 def _of_frames(
     model: Any, inverse: bool, frame: Any, q: Any, form: str, precision: str | int, out: Any, masked: bool = False
 ) -> np.ndarray:  # fmt: skip
-    """By kernels, or where they are not sure or know no such precision, by the operators, which say what is singular."""
+    """Compute by kernels, or by the operators if kernels are unreliable or lack the precision; operators name the singular directions."""
     names = [text(name, "a frame") for name in several(frame)]
     form, plain = chosen(form, "form"), isinstance(precision, str) and precision == "double"
     kernel = model._calls().operational_space if plain and form == "fast" else None
@@ -86,7 +86,7 @@ def _of_frames(
                 return _written(by_operators.at(q, form=form, precision=precision).dense(), out)
 
         def one(state: np.ndarray, told: str = "") -> np.ndarray:
-            found = kernel(inverse, names, state) if kernel else None  # each state as it is alone, whatever states are beside it
+            found = kernel(inverse, names, state) if kernel else None  # each state as it would be alone
             if found is not None:
                 return found
             try:
@@ -95,7 +95,7 @@ def _of_frames(
                 if masked:
                     return np.full((6 * len(names), 6 * len(names)), np.nan)
                 said = f"{error}{told}{_what_does_not_move(model, names, state)}"
-                more = "; on_singular='nan' or 'damped' goes on with the others" if told and inverse else ""
+                more = "; on_singular='nan' or 'damped' keeps the other states" if told and inverse else ""
                 raise _core.SingularOperatorError(said + more) from None
             except _core.Error as error:
                 raise type(error)(f"{error}{told}") from None
@@ -111,7 +111,7 @@ def _of_frames(
 
 def _damped(model: Any, frame: Any, q: Any, form: str, precision: str | int, damping: float, out: Any) -> np.ndarray:
     if chosen(form, "form") != "fast" or not isinstance(precision, str) or precision != "double":
-        raise _core.EvaluationError("on_singular='damped' is by the task space, in form 'fast' and double precision; leave them out")
+        raise _core.EvaluationError("on_singular='damped' is computed in form 'fast' and double precision; omit form= and precision=")
     names = [text(name, "a frame") for name in several(frame)]
     return _written(model.task_space(names, q, on_singular="damped", damping=damping).inertia, out)
 
@@ -125,7 +125,7 @@ def _written(result: np.ndarray, out: Any) -> np.ndarray:
 
 
 def _what_does_not_move(model: Any, names: list[str], q: Any) -> str:
-    """Of one state, in words; nothing of a batch, whose error names no direction."""
+    """Return the lost directions of one state in words; empty for a batch, since its error names no direction."""
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         return f". {', '.join(map(repr, twice))} is named twice, whose rows are the same"
     q = np.asarray(getattr(q, "q", q), float)

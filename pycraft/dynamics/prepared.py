@@ -1,4 +1,4 @@
-"""Direct calls for loops: the options are read once, and calls take arrays alone."""
+"""Direct calls for loops: options are read once, and calls take only arrays."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _CALLS = _core.direct_calls()
 _MADE: dict[str, type] = {}
-"""By name of a call with three results, the kind of tuple that holds them."""
+"""Named tuple of the results, by name of a call with three results."""
 
 
 def direct(function: F) -> F:
-    """Marks the method of a direct call: contiguous float64 arrays go from CPython to the core, everything else through the method."""
+    """Mark the method of a direct call: contiguous float64 arrays go from CPython to the core, everything else through the method."""
     return _core.direct_call(function)
 
 
 def direct_of(made: type) -> Callable[[F], F]:
-    """The same of a call with three results, which this kind of tuple holds."""
+    """Mark a call with three results, returned as this named tuple."""
 
     def mark(function: F) -> F:
         _MADE[function.__name__] = made
@@ -35,7 +35,7 @@ def direct_of(made: type) -> Callable[[F], F]:
 
 
 def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) -> Callable[..., Any]:
-    """What `Multibody.prepare` gives."""
+    """Implement `Multibody.prepare`."""
     if not isinstance(call, str) or call not in (*_CALLS, "hybrid_dynamics"):
         raise _core.EvaluationError(f"prepare takes {', '.join(map(repr, _CALLS))}, 'hybrid_dynamics', not {call!r}")
     arrays, known = _CALLS.get(call, ((), HYBRID_OPTIONS))
@@ -50,9 +50,9 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
     frame = []
     if "frame" in known:
         if "frame" not in options:
-            raise _core.EvaluationError(f"a prepared {call} is that of a frame: prepare({call!r}, frame=...)")
+            raise _core.EvaluationError(f"a prepared {call} needs a frame: prepare({call!r}, frame=...)")
         frame = [text(options["frame"], "a frame")]
-        model.pose(*frame)  # ModelError where no body or node has the name
+        model.pose(*frame)  # ModelError for an unknown body or node
     ordinary = partial(getattr(model, call), *frame, **{name: value for name, value in options.items() if name != "frame"})
 
     def call_with_other_arguments(*given: Any, out: Any = None) -> Any:
@@ -81,7 +81,7 @@ def prepared(model: Any, call: str, batch: int | None, options: dict[str, Any]) 
 
 
 def told(call: Any) -> Any:
-    """How a direct call is pickled and copied: a prepared one by what it was prepared with, a method by its name."""
+    """Return how a direct call is pickled and copied: a prepared call by its options, a method by its name."""
     made = vars(call.__wrapped__).get("prepared")
     return call.__qualname__ if made is None else (_again, made)
 

@@ -21,7 +21,8 @@ from .second_order import STEPS, Accelerations, Nominal, StateEquation, Step
 class Hessian(NamedTuple):
     """Second derivatives by states and states, states and inputs, inputs and inputs.
 
-    Of one function (n, n), (n, k), (k, k); of each state's rate an axis more before these, of a batch of states one before all.
+    For one function (n, n), (n, k), (k, k); for the rates of states with one more axis before these, for a batch of states with one before
+    all.
     """
 
     xx: np.ndarray
@@ -32,15 +33,15 @@ class Hessian(NamedTuple):
 class QuadraticModel(Closed):
     """δẋ = A δx + B δu + ½ (δx, δu)*∂²ẋ(δx, δu) near a state; with `dt`, the same of δx⁺ after a step of an integrator.
 
-    The states are x = (δq, v): δq are exponential coordinates about the motion that passes through the state, q = q₀ exp(δq), as
-    `integrate` takes them and `difference` gives them. Of a batch of states all arrays have a leading axis. Second derivatives are those of
-    the model when they are asked for: make a new one after an edit.
+    The states are x = (δq, v): δq are exponential coordinates about the motion through the state, q = q₀ exp(δq), as `integrate` takes them
+    and `difference` returns them. For a batch of states all arrays have a leading axis. Second derivatives are computed from the model on
+    demand: make a new quadratic model after an edit.
 
     Attributes
     ----------
-    linear : LinearModel, the first order, whose names and arrays are `states`, `inputs`, `A`, `B`
-    after : State, where a step ends; None where time is continuous
-    states_after : (own,), what effects of a scene have of their own there; None where time is continuous
+    linear : LinearModel, the first order, with its names and arrays as `states`, `inputs`, `A`, `B`
+    after : State, the end of a step; None for continuous time
+    states_after : (own,), the effects' own states of a scene there; None for continuous time
     """
 
     def __init__(
@@ -75,24 +76,24 @@ class QuadraticModel(Closed):
 
     @property
     def dt(self) -> float | None:
-        """s, of a step; None where time is continuous."""
+        """s, of a step; None for continuous time."""
         return self._linear.dt
 
     @property
     def after(self) -> State | None:
-        """Where the step ends."""
+        """The end of the step."""
         return self._after
 
     @property
     def states_after(self) -> np.ndarray | None:
-        """What effects of a scene have of their own where the step ends, (own,): of a model nothing."""
+        """The effects' own states of a scene at the end of the step, (own,): empty for a model."""
         return self._states_after
 
     def contracted(self, costate: Any) -> Hessian:
-        """The Hessian of costate*ẋ, or costate*x⁺, that differential dynamic programming asks for: no tensor is formed.
+        """Return the Hessian of costate*ẋ, or costate*x⁺, as differential dynamic programming needs it: no tensor is formed.
 
-        costate : (n,), or (B, n) beside a batch of states. Cost O(N · nv), and products of matrices (n, n); of a step for each stage. Of a
-        scene whose effects give forces O(N · n²).
+        costate : (n,), or (B, n) beside a batch of states. Cost O(N · nv), and products of matrices (n, n); for a step per stage. For a
+        scene with effects that exert forces O(N · n²).
 
         ModelError for a costate of another size, or with entries that are not finite.
         """
@@ -101,7 +102,7 @@ class QuadraticModel(Closed):
         if given.shape not in {(n,), (*batch, n)}:
             shapes = " or ".join(dict.fromkeys((f"({n},)", str((*batch, n)))))
             names = ", ".join(self.states[:12]) + (", ..." if n > 12 else "")
-            raise _core.ModelError(f"costate of {self._linear.model.name!r} takes numbers {shapes}, of {names}; it has shape {given.shape}")
+            raise _core.ModelError(f"costate of {self._linear.model.name!r} takes {shapes} values, of {names}; it has shape {given.shape}")
         if bad := first_not_finite(given):
             raise _core.ModelError(f"costate: entry {bad[0][0]} is not finite{bad[2]}")
         states = batch[0] if batch else 1
@@ -109,7 +110,7 @@ class QuadraticModel(Closed):
         return self._cut(found if batch else found[0])
 
     def tensors(self) -> Hessian:
-        """∂²ẋ, or ∂²x⁺, whole: (n, n, n), (n, n, k), (n, k, k), the first index that of the rate's component. O(N · nv²) and products."""
+        """Return ∂²ẋ, or ∂²x⁺, whole: (n, n, n), (n, n, k), (n, k, k), the first index the rate's component. O(N · nv²) and products."""
         batch, n = self.A.shape[:-2], len(self.states)
         states = batch[0] if batch else 1
         found = self._curvature.hessians(np.broadcast_to(np.eye(n), (states, n, n)))
@@ -120,30 +121,31 @@ class QuadraticModel(Closed):
         return Hessian(whole[..., :n, :n], whole[..., :n, n:], whole[..., n:, n:])
 
     def discrete(self, dt: float, integrator: str = "rkmk4") -> QuadraticModel:
-        """Of one step of dt seconds with inputs held, to second order: exactly that of the integrator, by chaining the rules of its stages.
+        """Return the model of one step of dt seconds with inputs held, exact to second order, by the chain rule over the integrator's
+        stages.
 
         Parameters
         ----------
         dt : s
         integrator : {"euler", "semi-implicit-euler", "rkmk4"}
             q⁺ = q exp(h v) and v⁺ = v + h v̇; q⁺ = q exp(h v⁺), the core's "semi-implicit-euler" without implicit effects; the classical
-            method of order 4 in exponential coordinates, the core's "rkmk4", which is its "rk4" where no ball or free hinge is.
+            method of order 4 in exponential coordinates, the core's "rkmk4", which equals its "rk4" without ball and free hinges.
 
         Returns
         -------
-        QuadraticModel : of the step, `.after` where it ends
+        QuadraticModel : of the step, with its end as `.after`
 
         Raises
         ------
         EvaluationError
-            An unknown integrator, a step that is no positive number, a model that is discrete already; "semi-implicit-euler" of a scene
-            with effects that it would take implicitly.
+            An unknown integrator, a step that is not a positive number, a model that is already discrete; "semi-implicit-euler" for a scene
+            with effects that it would treat implicitly.
         SingularHingeError
             As `forward_dynamics`, at a stage.
         """
         h = self._linear.step_of(dt, "quadratic")
         if integrator not in tuple(STEPS):
-            raise _core.EvaluationError(f"integrator={integrator!r}: steps to second order are of {', '.join(map(repr, STEPS))}")
+            raise _core.EvaluationError(f"integrator={integrator!r}: steps to second order exist for {', '.join(map(repr, STEPS))}")
         if integrator == "semi-implicit-euler" and self._at.implicit:
             named = ", ".join(map(repr, self._at.implicit))
             raise _core.EvaluationError(f"integrator='semi-implicit-euler' takes {named} at the end of a step: 'rkmk4' and 'euler' do not")
@@ -163,21 +165,22 @@ class QuadraticCalls(LinearizationCalls):
     def quadratic_model(
         self, q=None, v=None, tau=None, *, inputs: Any = None, form: str = "fast", precision: str = "double"
     ) -> QuadraticModel:
-        """The model of v̇ = forward_dynamics(q, v, τ) to second order near a state, or near each of a batch: what iLQR and DDP ask for.
+        """Return the model of v̇ = forward_dynamics(q, v, τ) to second order near a state, or near each of a batch, as iLQR and DDP need
+        it.
 
         `linearize` is its first order. To second order
 
             δq̇ = δv - ad(v₀) δq + ½ [δq, δv],    δv̇ = G z + ½ z*∂²v̇ z,    z = (δq, δv, δτ),
 
-        with the bracket of ball and free hinges, zero elsewhere, and ∂²v̇ along exponential coordinates, exact by derivatives of inverse
-        dynamics' closed forms. Of the model with generalized forces τ and gravity; `Scene.quadratic_model` has effects.
+        with the bracket of ball and free hinges, zero elsewhere, and ∂²v̇ along exponential coordinates, exact by derivatives of the closed
+        forms of inverse dynamics. For the model with generalized forces τ and gravity; `Scene.quadratic_model` includes effects.
 
         Parameters
         ----------
-        q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis; what is left out as in `forward_dynamics`
+        q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis; defaults as in `forward_dynamics`
         inputs : names of hinges, coordinates or patterns, or a list of them, whose generalized forces are inputs; None: all
-        form, precision : as in `forward_dynamics`, of accelerations and first derivatives; up to "quad". What one step hands to the next
-            is rounded to double.
+        form, precision : as in `forward_dynamics`, for accelerations and first derivatives; up to "quad". Intermediate results are rounded
+            to double.
 
         Returns
         -------
@@ -186,7 +189,7 @@ class QuadraticCalls(LinearizationCalls):
         Raises
         ------
         ModelError
-            Names that are not there.
+            Unknown names.
         SingularHingeError
             As `forward_dynamics`.
 

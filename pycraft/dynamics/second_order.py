@@ -1,4 +1,4 @@
-"""Second derivatives of accelerations, of the state equation and of a step, contracted with costates: what quadratic models are made of."""
+"""Second derivatives of accelerations, of the state equation and of a step, contracted with costates: the parts of quadratic models."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from .displacements import Moved, brackets, cobrackets, displaced
 
 
 def transposed(A: np.ndarray) -> np.ndarray:
-    """Of the last two axes."""
+    """Return the transposes over the last two axes."""
     return np.swapaxes(A, -1, -2)
 
 
 def chained(first: np.ndarray, second: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """first* `of` second (..., m, n, n) of first, second (..., k, n) and `of` (..., m, k, k)."""
+    """Return first* `of` second (..., m, n, n) of first, second (..., k, n) and `of` (..., m, k, k)."""
     return transposed(first)[..., None, :, :] @ of @ second[..., None, :, :]
 
 
 def both_ways(A: np.ndarray) -> np.ndarray:
-    """A + A*"""
+    """Return A + A*."""
     return A + transposed(A)
 
 
 def taken_back(costate: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """slope* costate, for each of costates (..., m, k): (..., m, n)."""
+    """Return slope* costate, for each of the costates (..., m, k): (..., m, n)."""
     return costate @ slope
 
 
 def as_they_are(q: np.ndarray, rest: np.ndarray, _: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nothing is prescribed."""
+    """Return q and rest unchanged: no motion is prescribed."""
     return q, rest
 
 
 class Nominal(NamedTuple):
-    """Where a model or scene is expanded.
+    """The state at which a model or scene is expanded.
 
     Attributes
     ----------
-    q, rest : (B, nq), (B, m): states, `rest` the velocities and what effects have of their own
+    q, rest : (B, nq), (B, m): states, `rest` the velocities and the effects' own states
     inputs : the coordinates whose generalized forces are inputs
-    turns : where ball and free subhinges stand in v
-    known : coordinates that go where they are told
-    implicit : names of effects that "semi-implicit-euler" takes at the end of the step
-    rates : `Accelerations` of q, rest and the seconds since, or the like of a scene
-    placed : of the same, the q and rest that known coordinates make of them
+    turns : slices of v with ball and free subhinges
+    known : coordinates with prescribed motion
+    implicit : names of effects that "semi-implicit-euler" treats implicitly
+    rates : `Accelerations` as a function of q, rest and the elapsed seconds, or the counterpart of a scene
+    placed : function of the same arguments, returns q and rest with prescribed coordinates placed
     """
 
     model: Any
@@ -63,17 +63,17 @@ class Nominal(NamedTuple):
 
 
 class Accelerations:
-    """v̇ = FD(q, v, τ) at states (B, ...), its derivatives along z = (q, v, τ), and second ones contracted.
+    """v̇ = FD(q, v, τ) at states (B, ...), its derivatives along z = (q, v, τ), and contracted second derivatives.
 
-    With T = ID(q, v, v̇) = τ, μ = (ℳ + J)⁻¹λ and G = ∂v̇/∂z, derivatives of 0 = μ*(ID(q, v, FD) - τ) once more give
+    With T = ID(q, v, v̇) = τ, μ = (ℳ + J)⁻¹λ and G = ∂v̇/∂z, differentiating 0 = μ*(ID(q, v, FD) - τ) once more gives
 
         λ*∂²v̇/∂z∂z = -(∂²p/∂z∂z + ∂²p/∂z∂v̇ G + (∂²p/∂z∂v̇ G)*),    p = μ*ID(q, v, v̇)
 
-    symmetrised along q: derivatives along quasi-velocities do not commute, and those along exponential coordinates are their mean.
-    Cost O(N · nv) for each λ, and the products of matrices.
+    symmetrised along q: derivatives along quasi-velocities do not commute, and derivatives along exponential coordinates are their mean.
+    Cost O(N · nv) per λ, and products of matrices.
 
     Source: S. Singh, R. Russell, P. Wensing, On second-order derivatives of rigid-body dynamics: theory and implementation, IEEE
-    Transactions on Robotics 40 (2024); for contraction the source of cpp/dynamics/curvature.h.
+    Transactions on Robotics 40 (2024); contraction as in cpp/dynamics/curvature.h.
     """
 
     def __init__(self, model: Any, how: dict[str, Any], tau: np.ndarray, q: np.ndarray, v: np.ndarray, _: float = 0.0):
@@ -83,7 +83,7 @@ class Accelerations:
         self.slopes = np.concatenate(model.forward_dynamics_derivatives(q, v, tau, **how), axis=-1)
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
-        """λ*∂²v̇/∂z∂z, (B, m, 3 nv, 3 nv), of λ (B, m, nv)."""
+        """Return λ*∂²v̇/∂z∂z, (B, m, 3 nv, 3 nv), for λ (B, m, nv)."""
         n = self.slopes.shape[-2]
         inverse = self.slopes[..., 2 * n :]
         core = cached(self._model, "_curvature", _core.Curvature)
@@ -92,7 +92,8 @@ class Accelerations:
 
 
 def curved(along: np.ndarray, slopes: np.ndarray, forces: np.ndarray | None = None) -> np.ndarray:
-    """λ*∂²/∂z∂z of rates, of blocks (B, m, 4, nv, nv) of p, of first derivatives, v̇'s first, and of forces that p has not (B, m, n, n)."""
+    """Return λ*∂²/∂z∂z of rates, from blocks (B, m, 4, nv, nv) of p, first derivatives, v̇'s first, and forces missing in p (B, m, n,
+    n)."""
     nv = along.shape[-1]
     out = np.zeros((*along.shape[:2], slopes.shape[-1], slopes.shape[-1]))
     qq, qv, with_vdot, vv = (along[..., i, :, :] for i in range(4))
@@ -105,11 +106,11 @@ def curved(along: np.ndarray, slopes: np.ndarray, forces: np.ndarray | None = No
 
 
 class StateEquation:
-    """ẋ = (δq̇, v̇, ẏ) of displacements δq from the motion that passes through the state, v, and effects' own states y, at states (B, ...).
+    """ẋ = (δq̇, v̇, ẏ) of displacements δq from the motion through the state, v, and effects' own states y, at states (B, ...).
 
         δq̇ = δv - ad(v₀) δq + ½ [δq, δv] + (third order),    v̇ as `Accelerations`
 
-    since q = q₀(t) exp(δq) moves with J(δq) δq̇ = v - exp(-ad δq) v₀, of which the terms in δq and δq cancel.
+    since q = q₀(t) exp(δq) moves with J(δq) δq̇ = v - exp(-ad δq) v₀, where the terms in δq and δq cancel.
     """
 
     def __init__(self, at: Nominal):
@@ -119,7 +120,7 @@ class StateEquation:
         self.rates = at.rates(at.q, at.rest, 0.0)
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
-        """costate*∂²ẋ/∂(x, u)∂(x, u), (B, m, n + k, n + k), of costates (B, m, n) and k inputs."""
+        """Return costate*∂²ẋ/∂(x, u)∂(x, u), (B, m, n + k, n + k), for costates (B, m, n) and k inputs."""
         n, of_q = self._nv, np.array(costate[..., : self._nv])
         of_q[..., self._known] = 0.0
         out = self.rates.hessians(costate[..., n:])
@@ -134,19 +135,19 @@ STEPS: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "semi-implicit-euler": ((0.0,), (1.0,)),
     "rkmk4": ((0.0, 0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
 }
-"""Of each way to take a step: how far each stage goes along the one before, and weights."""
+"""For each method of steps: the distance of each stage along the one before, and the weights."""
 
 
 class Step:
     """One step of an integrator from states (B, ...), exact to second order: x = (δq, v) and inputs held over it to (δq⁺, v⁺).
 
-    With q = q₀ exp(u), u = 0 at first, stage s goes a part pₛ of the step h along the stage before, and
+    With q = q₀ exp(u), u = 0 at first, stage s advances by a part pₛ of the step h along the stage before, and
 
         rₛ = vₛ + ½ [uₛ, vₛ] + 1/12 [uₛ, [uₛ, vₛ]],    v̇ₛ = FD(q₀ exp(uₛ), vₛ, τ),    u⁺ = h Σ wₛ rₛ,    v⁺ = v + h Σ wₛ v̇ₛ
 
-    or u⁺ = h v⁺, semi-implicit; what effects have of their own goes as v does, known coordinates are placed at every stage and at
-    the end. Each of these maps has its first and second derivatives by rule; first ones are chained forward, costates
-    backward, and the second ones of all are summed between first ones: λ*∂²x⁺ = Σ (∂zₛ)* (λₛ*∂²zₛ₊₁) (∂zₛ). Nothing is differenced.
+    or u⁺ = h v⁺, semi-implicit; the effects' own states advance as v does, prescribed coordinates are placed at every stage and at the end.
+    Each of these maps has its first and second derivatives in closed form; first derivatives are chained forward, costates backward, and
+    the second derivatives of all are summed between first ones: λ*∂²x⁺ = Σ (∂zₛ)* (λₛ*∂²zₛ₊₁) (∂zₛ). No finite differences.
     """
 
     def __init__(self, at: Nominal, dt: float, method: str):
@@ -180,7 +181,7 @@ class Step:
         self.slopes = np.concatenate([self._moved.adjoint @ self._start + self._moved.differential @ along_u, along_rest], axis=-2)
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
-        """costate*∂²x⁺/∂(x, u)∂(x, u), (B, m, n + k, n + k), of costates (B, m, n) and k inputs."""
+        """Return costate*∂²x⁺/∂(x, u)∂(x, u), (B, m, n + k, n + k), for costates (B, m, n) and k inputs."""
         n, h = self._nv, self._dt
         of_q, of_rest = costate[..., :n], np.array(costate[..., n:])
         out = weighed(self._moved, of_q, self._start, self._along_u)
@@ -198,7 +199,7 @@ class Step:
 
 
 class Stage:
-    """Of a step: u and the rest there, the rates of both, and the derivatives of all along (x, inputs), (B, ..., n + k)."""
+    """A stage of a step: u and the rest there, the rates of both, and the derivatives of all along (x, inputs), (B, ..., n + k)."""
 
     def __init__(
         self, at: Nominal, later: float, u: np.ndarray, rest: np.ndarray, along_q: np.ndarray, along_u: np.ndarray, along_rest: np.ndarray,
@@ -220,7 +221,8 @@ class Stage:
         self.along_rate = self._rate_by_u @ along_u + self._rate_by_v @ self._along_v
 
     def back(self, of_rate: np.ndarray, of_rates: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of costates of u's rate (B, m, nv) and of the rest's what second derivatives they weigh, and the costates of u and the rest."""
+        """From costates of the rates of u (B, m, nv) and of the rest, return the weighted second derivatives, and the costates of u and the
+        rest."""
         n = of_rate.shape[-1]
         out = chained(self._along_all, self._along_all, self.rates.hessians(of_rates))
         through = taken_back(of_rates, self.rates.slopes)
@@ -231,7 +233,7 @@ class Stage:
         return out, of_u, of_rest
 
     def _of_rate(self, costate: np.ndarray) -> np.ndarray:
-        """λ*∂²r of r = v + ½ [u, v] + 1/12 [u, [u, v]]."""
+        """Return λ*∂²r of r = v + ½ [u, v] + 1/12 [u, [u, v]]."""
         by_u = brackets(self._turns, self._u)
         C = cobrackets(self._turns, costate)
         carried = cobrackets(self._turns, taken_back(costate, by_u))
@@ -242,6 +244,7 @@ class Stage:
 
 
 def weighed(moved: Moved, costate: np.ndarray, along_q: np.ndarray, along_u: np.ndarray) -> np.ndarray:
-    """What the second derivatives of a motion's end on the group weigh, chained with the first ones of where it starts and goes."""
+    """Return the weighted second derivatives of a motion's end on the group, chained with the first derivatives of its start and
+    direction."""
     mixed, own = moved.curvature(costate)
     return both_ways(chained(along_q, along_u, mixed)) + chained(along_u, along_u, own)

@@ -1,7 +1,7 @@
-"""Derivatives of the direct calls: arrays in, arrays out. The same quantities as expressions are `Operator.diff`.
+"""Derivatives of the direct calls: arrays in, arrays out. `Operator.diff` gives the same quantities as expressions.
 
-Derivatives along q are along coordinates, and on ball and free hinges along quasi-velocities (in which v is given). Third-order arrays
-have the derivative last. Every call takes one state or a leading batch axis, and a precision.
+Derivatives by q are along coordinates, and on ball and free hinges along quasi-velocities (as v is given). In third-order arrays the
+derivative index is last. Every call takes one state or a leading batch axis, and a precision.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class SensitivityCalls(OperationalSpaceCalls):
     """Derivatives of inverse and forward dynamics, of the mass matrix, of energy, momentum and Jacobians; the inertial regressor."""
 
     def _sensitivities(self) -> _core.Sensitivities:
-        self._calls()  # which contiguous arrays go by, from the second call on
+        self._calls()  # contiguous arrays bypass it from the second call on
         return cached(self, "_derivatives", _core.Sensitivities)
 
     @direct_of(DynamicsDerivatives)
@@ -48,7 +48,7 @@ class SensitivityCalls(OperationalSpaceCalls):
     def inverse_dynamics_derivatives(
         self, q=None, v=None, vdot=None, *, precision: str = "double", threads: int = 1
     ) -> DynamicsDerivatives:
-        """∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
+        """Return ∂T/∂q, ∂T/∂v and ∂T/∂v̇ = ℳ + J of T = inverse_dynamics(q, v, v̇), gravity included. Cost O(N · depth)."""
         q, v = at_state(self, q, v)
         vdot = np.zeros(self.nv) if vdot is None else vdot
         return DynamicsDerivatives(*self._sensitivities().inverse_dynamics(q, v, vdot, precision))
@@ -67,15 +67,15 @@ class SensitivityCalls(OperationalSpaceCalls):
         precision: str = "double",
         threads: int = 1,
     ) -> DynamicsDerivatives:
-        """∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Raises what it raises.
+        """Return ∂v̇/∂q, ∂v̇/∂v and ∂v̇/∂τ = (ℳ + J)⁻¹ of v̇ = forward_dynamics(q, v, τ). Raises the same errors.
 
-        In the form "fast" by the sweeps of forward dynamics on a column for each coordinate, O(N²); where that is in doubt, at other
-        precisions and refined as asked, -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇. Forces of heavy bodies hide a light one's there.
-        The forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated, four directions at a time,
-        in O(N²) as well, at about N times the cost of one; refinement acts on (ℳ + J)⁻¹ alone then. Where the sweep has no derivative
-        (P⁺ is singular at this very configuration, not beside it) the first way is taken with the form's inverse.
+        In the form "fast": by the sweeps of forward dynamics on one column per coordinate, O(N²); if these are unreliable, at other
+        precisions and with refinement, -(ℳ + J)⁻¹ ∂T/∂q and -(ℳ + J)⁻¹ ∂T/∂v at v̇, where forces of heavy bodies hide a light body's. The
+        forms "ud" and "square-root" keep the digits that v̇ keeps: the sweep of "ud" is differentiated, four directions at a time, also in
+        O(N²), at about N times the cost of one; refinement then acts only on (ℳ + J)⁻¹. If the sweep has no derivative (P⁺ is singular at
+        this very configuration, not beside it) the first method is used with the form's inverse.
 
-        The free root's travel enters ∂v̇/∂v of its own linear accelerations and nothing else.
+        The free root's travel enters ∂v̇/∂v only in its own linear accelerations.
         """
         q, v = at_state(self, q, v)
         tau = np.zeros(self.nv) if tau is None else tau
@@ -85,17 +85,17 @@ class SensitivityCalls(OperationalSpaceCalls):
 
     @over_threads
     def mass_matrix_derivative(self, q=None, *, precision: str = "double", threads: int = 1, out=None) -> np.ndarray:
-        """∂ℳ/∂q, (nv, nv, nv) or (B, nv, nv, nv): entry (i, j, k) is ∂ℳ(i,j)/∂q_k. Cost O(N · depth²) beside the zeros."""
+        """Return ∂ℳ/∂q, (nv, nv, nv) or (B, nv, nv, nv): entry (i, j, k) is ∂ℳ(i,j)/∂q_k. Cost O(N · depth²) beside the zeros."""
         q, _ = at_state(self, q)
         return self._sensitivities().third_order(False, q, precision, out)
 
     @over_threads
     def christoffel(self, q=None, *, precision: str = "double", threads: int = 1, out=None) -> np.ndarray:
-        """Christoffel symbols of the first kind Γ (nv, nv, nv): Σ_jk Γ(i,j,k) v_j v_k is the Coriolis force, and Σ_k Γ(i,j,k) v_k = C(i,j).
+        """Return the Christoffel symbols of the first kind Γ (nv, nv, nv): Σ_jk Γ(i,j,k) v_j v_k is the Coriolis force, Σ_k Γ(i,j,k) v_k =
+        C(i,j).
 
-        Γ(i,j,k) = ½(∂_kℳ(i,j) + ∂_jℳ(i,k) - ∂_iℳ(j,k)), and on ball and free hinges the brackets of the quasi-velocities besides (Koszul).
-        Γ(i,j,k) - Γ(i,k,j) is the bracket's: zero for coordinates. Of rotors, whose
-        inertias are constant, there are the brackets alone.
+        Γ(i,j,k) = ½(∂_kℳ(i,j) + ∂_jℳ(i,k) - ∂_iℳ(j,k)), plus the brackets of the quasi-velocities on ball and free hinges (Koszul).
+        Γ(i,j,k) - Γ(i,k,j) is the term of the bracket: zero for coordinates. Rotors, with constant inertias, contribute only brackets.
         """
         q, _ = at_state(self, q)
         return self._sensitivities().third_order(True, q, precision, out)
@@ -105,16 +105,16 @@ class SensitivityCalls(OperationalSpaceCalls):
     def coriolis_matrix(
         self, q=None, v=None, *, form: str = "christoffel", precision: str | int = "double", threads: int = 1, out=None
     ) -> np.ndarray:
-        """C (nv, nv) with C v the Coriolis and gyroscopic forces (gravity apart) and ℳ̇ - 2C skew. Cost O(N · depth).
+        """Return C (nv, nv) with C v the Coriolis and gyroscopic forces (without gravity) and ℳ̇ - 2C skew. Cost O(N · depth).
 
-        Rotors of balls and free hinges, whose momentum is Jv, add S with S_ij = (Jv)·[e_i, e_j] to the second, and to the first
+        Rotors of balls and free hinges, with momentum Jv, add S with S_ij = (Jv)·[e_i, e_j] to the second, and to the first
         ½(J ad_v - ad_v*J + S): Christoffel's of ℳ + J.
 
         form="christoffel": C = Hφ(M𝒥̇ + ½(𝓑 + V̄M + MṼ)𝒥) = Γ v, the one for which also ∂(Cv)/∂v = 2C on hinges of one coordinate each;
-        "skew": C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, which is skew-consistent too and not Christoffel's.
+        "skew": C = Hφ(M𝒥̇ + 𝓑𝒥), 𝒥 = φ*H*, also skew-consistent, but not Christoffel's.
         """
         q, v, form = *at_state(self, q, v), chosen(form, "form")
-        if form == "skew" and str(precision).isdigit():  # of so many digits, as operators are
+        if form == "skew" and str(precision).isdigit():  # with that many digits, as operators are
             return self._coriolis_operator(q, v, precision, out)
         return self._sensitivities().coriolis_matrix(q, v, form, precision, out)
 
@@ -130,7 +130,8 @@ class SensitivityCalls(OperationalSpaceCalls):
         return result
 
     def rotor_forces(self, v=None) -> np.ndarray:
-        """v ×* (J v) of rotors on balls and free hinges, (nv,) or (B, nv): what they ask for at zero acceleration (docs/conventions.md)."""
+        """Return v ×* (J v) of rotors on balls and free hinges, (nv,) or (B, nv): their forces at zero acceleration
+        (docs/conventions.md)."""
         v = at_state(self, None, v)[1]
         if not self.has_rotor_inertia:  # type: ignore[attr-defined]  # the model's
             return np.zeros(np.shape(v))
@@ -138,12 +139,12 @@ class SensitivityCalls(OperationalSpaceCalls):
         return self.rotor_regressor(v, np.zeros(self.nv)) @ J
 
     def _rotor_coriolis(self, v: np.ndarray, christoffel: bool) -> np.ndarray:
-        """What rotors add to C at velocities (..., nv), (..., nv, nv)."""
+        """Return the rotors' part of C at velocities (..., nv), (..., nv, nv)."""
         return self._sensitivities().rotor_coriolis(_states(v), christoffel).reshape(*v.shape, self.nv)
 
     @over_threads
     def kinetic_energy_derivatives(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> tuple[np.ndarray, np.ndarray]:
-        """∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv,) or (B, nv). Cost O(N)."""
+        """Return ∂KE/∂q and ∂KE/∂v = (ℳ + J) v, each (nv,) or (B, nv). Cost O(N)."""
         q, v = at_state(self, q, v)
         return self._sensitivities().kinetic_energy(q, v, precision)
 
@@ -151,11 +152,11 @@ class SensitivityCalls(OperationalSpaceCalls):
     def hamiltonian_dynamics(
         self, q=None, p=None, tau=None, *, precision: str = "double", threads: int = 1
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The Hamiltonian form in O(N): v and ṗ of the generalized momenta p = (ℳ + J) v under the forces tau, gravity included.
+        """Return v and ṗ of the Hamiltonian form, with generalized momenta p = (ℳ + J) v under the forces tau, gravity included. O(N).
 
-        Without p those of the state's v.
+        Default: p of the state's v.
 
-        ṗ = T + Ḣp - HV̄p of the bodies' momenta p = φMV, so that no derivative of ℳ is formed. Each (nv,) or (B, nv). SingularHingeError
+        ṗ = T + Ḣp - HV̄p with the bodies' momenta p = φMV: no derivative of ℳ is formed. Each (nv,) or (B, nv). SingularHingeError
         as in forward dynamics.
         """
         q, v = at_state(self, q)
@@ -168,9 +169,9 @@ class SensitivityCalls(OperationalSpaceCalls):
 
     @over_threads
     def innovations(self, q=None, v=None, tau=None, *, precision: str = "double", threads: int = 1) -> tuple[np.ndarray, np.ndarray]:
-        """Innovations velocity ξ = [I+HφK]*v and innovations ε = [I-HψK](τ - 𝒞), each (nv,) or (B, nv): decoupled coordinates.
+        """Return the innovations velocity ξ = [I+HφK]*v and innovations ε = [I-HψK](τ - 𝒞), each (nv,) or (B, nv): decoupled coordinates.
 
-        2 KE = ξ*Dξ and 2 × the acceleration energy's like: (τ-𝒞)*(ℳ+J)⁻¹(τ-𝒞) = ε*D⁻¹ε, both sums over hinges. O(N).
+        2 KE = ξ*Dξ, and likewise (τ-𝒞)*(ℳ+J)⁻¹(τ-𝒞) = ε*D⁻¹ε, twice the acceleration energy; both are sums over hinges. O(N).
         """
         q, v, tau, _ = motion_state(self, *at_state(self, q, v), np.zeros(self.nv) if tau is None else tau)
         H, phi, K, psi, I = self.soa("H phi K psi I")  # type: ignore[attr-defined]  # the model's
@@ -179,9 +180,9 @@ class SensitivityCalls(OperationalSpaceCalls):
         return whole.at(q, precision=precision) @ v, inverse.at(q, precision=precision) @ forces
 
     def diagonalised_dynamics(self, q=None, v=None, tau=None, *, precision: str = "double") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """η, S and m⁻¹τ' of η̇ + Sη = m⁻¹τ', m = [I+HφK]D^½, η = m*v, S skew, τ' = τ less gravity's forces: (nv,), (nv, nv), (nv,).
+        """Return η, S and m⁻¹τ' of η̇ + Sη = m⁻¹τ', m = [I+HφK]D^½, η = m*v, S skew, τ' = τ without gravity: (nv,), (nv, nv), (nv,).
 
-        2 KE = η*η; S does no work. Of a batch with an axis (B, ...) before. Cost O(N) for η and m⁻¹τ', O(N²) for S.
+        2 KE = η*η; S does no work. For a batch with a leading axis (B, ...). Cost O(N) for η and m⁻¹τ', O(N²) for S.
         """
         q, v, tau, _ = motion_state(self, *at_state(self, q, v), np.zeros(self.nv) if tau is None else tau)
         H, phi, K, psi, M, D, I = self.soa("H phi K psi M D I")  # type: ignore[attr-defined]  # the model's
@@ -203,28 +204,29 @@ class SensitivityCalls(OperationalSpaceCalls):
 
     @over_threads
     def momentum(self, q=None, v=None, *, precision: str = "double", threads: int = 1) -> Momentum:
-        """Momentum of all bodies about the world's origin, its matrix and its derivative. Cost O(N)."""
+        """Return the momentum of all bodies about the world's origin, its matrix and its derivative. Cost O(N)."""
         q, v = at_state(self, q, v)
         matrix, dq = self._sensitivities().momentum(q, v, precision)
         return Momentum(np.einsum("...ij,...j->...i", matrix, np.asarray(v, float)), matrix, dq)
 
     @over_threads
     def jacobian_dot(self, frame: str, q=None, v=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """Time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(N)."""
+        """Return the time derivative (6, nv) or (B, 6, nv) of `jacobian(frame, q)` along v, in the same axes. Cost O(N)."""
         q, v = at_state(self, q, v)
         return self._sensitivities().jacobian_rate(text(frame, "a frame"), q, v, precision)
 
     @over_threads
     def jacobian_derivative(self, frame: str, q=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """The kinematic Hessian ∂𝒥/∂q of `jacobian(frame, q)` in its own axes, (6, nv, nv) or (B, 6, nv, nv). Cost O(N + depth²)."""
+        """Return the kinematic Hessian ∂𝒥/∂q of `jacobian(frame, q)` in its own axes, (6, nv, nv) or (B, 6, nv, nv). Cost O(N + depth²)."""
         q, _ = at_state(self, q)
         return self._sensitivities().jacobian_derivative(text(frame, "a frame"), q, precision)
 
     @over_threads
     def inertial_regressor(self, q=None, v=None, vdot=None, *, precision: str = "double", threads: int = 1) -> np.ndarray:
-        """Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + Y_J J, gravity included, Y_J that of rotors. Cost O(N · depth).
+        """Return Y (nv, 10 n) or (B, nv, 10 n) with inverse_dynamics = Y π + Y_J J, gravity included, Y_J of the rotors. Cost O(N · depth).
 
-        π holds ten numbers per body, in the bodies' order (`inertial_parameters`): mass, mass times centre of mass (3), rotational inertia
+        π holds ten parameters per body, in the bodies' order (`inertial_parameters`): mass, mass times centre of mass (3), rotational
+        inertia
         about the body's origin (xx, xy, xz, yy, yz, zz).
         """
         q, v = at_state(self, q, v)
@@ -232,7 +234,7 @@ class SensitivityCalls(OperationalSpaceCalls):
         return self._sensitivities().inertial_regressor(q, v, vdot, precision)
 
     def rotor_regressor(self, v=None, vdot=None) -> np.ndarray:
-        """Y_J (nv, nv) or (B, nv, nv) with inverse_dynamics = Y π + Y_J J, J (nv,) the rotor inertias: J v̇ + v ×* (J v).
+        """Return Y_J (nv, nv) or (B, nv, nv) with inverse_dynamics = Y π + Y_J J, J (nv,) the rotor inertias: J v̇ + v ×* (J v).
 
         On hinges of one coordinate each it is diag(v̇); on balls and free hinges v ×* (J v) is added (docs/conventions.md).
 
@@ -252,7 +254,7 @@ class SensitivityCalls(OperationalSpaceCalls):
         return self._sensitivities().rotor_regressor(*rows).reshape(*arrays[0].shape, self.nv)
 
     def inertial_parameters(self) -> np.ndarray:
-        """π (10 n,) of the regressor, from the bodies' present mass properties."""
+        """Return π (10 n,) of the regressor, from the bodies' present mass properties."""
         rows = []
         for body in self.bodies.values():  # type: ignore[attr-defined]  # the model's
             c, mass = body.com, body.mass
@@ -261,7 +263,7 @@ class SensitivityCalls(OperationalSpaceCalls):
         return np.concatenate(rows) if rows else np.zeros(0)
 
     def log_determinant_gradient(self, q=None, over: str = "coordinates", *, precision: str = "double") -> np.ndarray:
-        """Gradient of ln det(ℳ + J) in three sweeps, O(N), whatever it is taken over.
+        """Return the gradient of ln det(ℳ + J) in three sweeps, O(N) for every `over`.
 
         "coordinates" (nv,); "inertias" (n, 10), by the regressor's parameters: tr(Υ∂M); "geometry" (n, 6), by a twist at each hinge's
         placement: 2 tr(P⁺WΔ), W = blockdiag(E*ΥE); "axes" (nv, 6), by the rows of H in the body's axes, poses held: 2(I - P⁺W)G.
@@ -271,12 +273,13 @@ class SensitivityCalls(OperationalSpaceCalls):
 
 
 def _states(x: np.ndarray) -> np.ndarray:
-    """(B, n) of (..., n)."""
+    """Return x (..., n) as (B, n)."""
     return np.ascontiguousarray(x, float).reshape(int(np.prod(x.shape[:-1])), x.shape[-1])
 
 
 def _without_spheres(hinge: Any) -> np.ndarray:
-    """Rotor inertias of a hinge less the first rotor's of all three turns of a ball or free subhinge, which no v ×* sees."""
+    """Return the rotor inertias of a hinge minus the first rotor's in all three rotations of a ball or free subhinge, which do not enter v
+    ×*."""
     J, at = np.array(hinge.rotor_inertia), 0
     for size in (_core.subhinge_kinds[subhinge["kind"]].nv for subhinge in hinge.subhinges):
         if size > 1:

@@ -20,9 +20,9 @@ from .inverse_on_loops import actuated_coordinates, beyond, check_on_loops, shar
 class Counterbalance(NamedTuple):
     """Forces that hold a model at rest.
 
-    tau : (nv,) or (B, nv) N m and N, zero where nothing is actuated
-    residual : likewise, what is left at the others: the least that any forces of these actuators leave, and of the loops
-    unbalanced : names of coordinates at which something is left, beyond rounding, at any of the states
+    tau : (nv,) or (B, nv) N m and N, zero at coordinates that are not actuated
+    residual : likewise, the unbalanced part: the least that any forces of these actuators and of the loops leave
+    unbalanced : names of coordinates with a residual beyond rounding, at any of the states
     """
 
     tau: np.ndarray
@@ -31,7 +31,7 @@ class Counterbalance(NamedTuple):
 
 
 def held_by(model: Any, hold: Any) -> list[int]:
-    """Coordinates that stay where they are, by the rule of what hybrid dynamics has prescribed."""
+    """Return the numbers of held coordinates, by the rule for prescribed ones in hybrid dynamics."""
     return np.flatnonzero(_core.prescribed_by(model, prescribed_names(hold, "hold"), "hold")).tolist()
 
 
@@ -44,23 +44,23 @@ class StaticsCalls:
         self, tau: Any = None, q0: Any = None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", hold: Any = (),
         limits: bool = False, stable: bool = False, tolerance: float = TOLERANCE, loops: bool = False,
     ) -> Any:  # fmt: skip
-        """A configuration at which the model stays at rest: τ = T(q, 0, 0), gravity and wrenches included.
+        """Return a configuration at which the model stays at rest: τ = T(q, 0, 0), gravity and wrenches included.
 
-        From q0 by SciPy's `root` and `least_squares` with the exact derivative of T, on displacements that the group takes (ball and free
-        hinges too). Of several equilibria the one that the solver comes to, near q0 where that is near one; with stable=True the model
-        first goes down its forces' slope, and the equilibrium is one that it comes back to.
+        The search starts at q0 and uses SciPy's `root` and `least_squares` with the exact derivative of T, on displacements of the group
+        (including ball and free hinges). Of several equilibria it returns the one that the solver reaches, usually one near q0; with
+        stable=True the model first descends along the slope of its forces, and returns to the equilibrium after small displacements.
 
         Parameters
         ----------
-        tau : (nv,) N m and N, or (B, nv), or one number for all: constant generalized forces; zero where left out
-        q0 : (nq,) or a State, where the search starts, or (B, nq); the model's present state where left out
+        tau : (nv,) N m and N, or (B, nv), or one value for all: constant generalized forces; default: zero
+        q0 : (nq,) or a State, the start of the search, or (B, nq); default: the model's present state
         wrenches, wrench_axes : as in `interbody_forces`; in the world's axes they keep their direction as the model moves
-        hold : names of hinges, coordinates or patterns, or a list of them, that stay where q0 has them, each once
-            Locked hinges and welds stay as they are, named or not; the rule is that of `hybrid_dynamics(prescribed=)`.
-        limits : whether q is to be within the hinges' limits
-        stable : whether only a stable or indifferent equilibrium will do
-        tolerance : what may be left, as a part of the largest force
-        loops : whether the loops are kept: the search starts at the state on them near q0, and their forces balance, too
+        hold : names of hinges, coordinates or patterns, or a list of them, that keep their values in q0, each once
+            Locked hinges and welds stay as they are, named or not; the rule is the same as for `hybrid_dynamics(prescribed=)`.
+        limits : whether q must be within the hinges' limits
+        stable : whether to accept only a stable or indifferent equilibrium
+        tolerance : largest residual, relative to the largest force
+        loops : whether to keep the loops: the search starts at the state on them near q0, and their forces are included in the balance
 
         Returns
         -------
@@ -69,9 +69,9 @@ class StaticsCalls:
         Raises
         ------
         EvaluationError
-            None was found, with what is left by coordinate; none that is stable.
+            No equilibrium was found, with the residual by coordinate; no stable one.
         ModelError
-            Names that are not there; numbers that are not finite.
+            Unknown names; values that are not finite.
 
         Examples
         --------
@@ -129,22 +129,22 @@ class StaticsCalls:
         self, q=None, *, wrenches: Mapping[Any, Any] | None = None, wrench_axes: str = "world", actuated: Any = None,
         tolerance: float = TOLERANCE, loops: bool | None = None,
     ) -> Counterbalance:  # fmt: skip
-        """The generalized forces that hold the model at rest against gravity and wrenches, T(q, 0, 0): O(N).
+        """Return the generalized forces that hold the model at rest against gravity and wrenches, T(q, 0, 0): O(N).
 
-        Of a model with loops τ + Q*λ = T: the loops carry what they can, and τ is of the least Σ τ² where several forces hold it.
-        `constrained_inverse_dynamics` at rest has λ beside τ.
+        For a model with loops τ + Q*λ = T: the loops carry what they can, and τ has the least Σ τ² if several forces hold the model.
+        `constrained_inverse_dynamics` at rest also returns λ.
 
         Parameters
         ----------
-        q : (nq,) or (B, nq), or a State; the model's present one where left out
+        q : (nq,) or (B, nq), or a State; default: the model's present state
         wrenches, wrench_axes : as in `interbody_forces`
-        actuated : names of hinges, coordinates or patterns, or a list of them, that can be driven; None: all
-            A force at one coordinate balances no other but through loops, so that what the others need is left.
-        tolerance : what may be left, as a part of the largest force
-        loops : whether the loops carry their part, at a q on them; None: where the model has some. False: forces of the tree alone.
+        actuated : names of hinges, coordinates or patterns, or a list of them, of driven coordinates; None: all
+            A force at one coordinate balances another only through loops, so forces needed at other coordinates remain as the residual.
+        tolerance : largest residual, relative to the largest force
+        loops : whether the loops carry their part, at a q on them; None: if the model has loops. False: forces of the tree alone.
 
-        Raises ModelError for names that are not there and a q that is off the loops, by the row, EvaluationError for a tolerance that is
-        none, and as `interbody_forces`.
+        Raises ModelError for unknown names and a q that is off the loops, by the row, EvaluationError for an invalid tolerance, and the
+        errors of `interbody_forces`.
 
         Examples
         --------

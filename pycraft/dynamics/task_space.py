@@ -1,4 +1,4 @@
-"""Task space: the equations of motion of nodes, along all of their directions or some."""
+"""Task space: the equations of motion of nodes, along all or some of their directions."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from .direct_calls import cached
 TWIST = ("rx", "ry", "rz", "x", "y", "z")
 """Directions of a frame in its own axes, angular first."""
 SHARED = 2.0**-8
-"""Of a direction's compliance, what must be its own beside the others': else two digits would go, which the decomposition keeps."""
+"""Least compliance of a direction on its own beside the others: below it two digits would be lost, which the decomposition keeps."""
 
 LARGEST_ROW = 1e100
-"""Largest row of directions, and one over the smallest: squares are in Λ⁻¹, and leave the range of numbers from 1e154 on."""
+"""Largest row of directions, and one over the smallest: Λ⁻¹ contains squares, which overflow from 1e154 on."""
 
 
 ON_SINGULAR = ("raise", "nan", "damped")
-"""What becomes of states at which not all directions can move independently."""
+"""Treatment of states at which not all directions can move independently."""
 
 
 def damping_of(on_singular: Any, damping: Any) -> float | None:
-    """The least singular value that counts, where it is damped. EvaluationError for what is not there."""
+    """Return the least singular value, if damped. EvaluationError for unknown options."""
     if text(on_singular, "on_singular") not in ON_SINGULAR:
         raise _core.EvaluationError(f"on_singular={on_singular!r} of a task space: there are {', '.join(map(repr, ON_SINGULAR))}")
     number = one_number(damping, "damping")
@@ -39,30 +39,32 @@ def damping_of(on_singular: Any, damping: Any) -> float | None:
 
 
 class TaskSpace(Closed):
-    """The motion of nodes along some directions at a state, or at each of a batch: ẍ = Λ⁻¹F + J v̇₀ + J̇v.
+    """Motion of nodes along some directions at a state, or at each of a batch: ẍ = Λ⁻¹F + J v̇₀ + J̇v.
 
     ẋ = J v are the components of the nodes' velocities along the directions, each in its frame's own axes, F the forces on the nodes along
-    them, and v̇₀ what gravity, velocities and hinge forces τ make of the accelerations by themselves. By Ω's recursion, O(N + m depth) for m
-    nodes, and O(N k) for Y,
+    them, and v̇₀ the accelerations due to gravity, velocities and hinge forces τ. By Ω's recursion, O(N + m depth) for m nodes, and O(N k)
+    for Y,
 
         Λ⁻¹ = C B*ΩB C* = R⁻¹R⁻*,    Λ = R*R,    Y = (ℳ + J_rotors)⁻¹J*,    J̄ = YΛ,    N = 1 - J̄J
 
-    C the directions in the nodes' motions, R from Λ⁻¹'s Cholesky factor in units in which each direction alone has unit compliance. Where a
-    pivot there is less than `SHARED`, or kernels are not sure, all is the singular value decomposition of W = J L⁻*, LL* = ℳ + J_rotors,
+    C the directions in the nodes' motions, R from Λ⁻¹'s Cholesky factor in units in which each direction alone has unit compliance. If a
+    pivot is less than `SHARED`, or kernels are unreliable, everything uses the singular value decomposition of W = J L⁻*, LL* = ℳ +
+    J_rotors,
 
         Λ⁻¹ = WW*,    Λ = (W⁺)*W⁺,    J̄ = L⁻*W⁺
 
-    so that near singular poses half as many digits are lost as by inverting Λ⁻¹; that costs O(nv³). Everything has a leading axis for a
-    batch.
+    so that near singular poses half as many digits are lost as by inverting Λ⁻¹; that costs O(nv³). For a batch all results have a leading
+    axis.
 
-    At a state where not all directions can move independently Λ does not exist. on_singular="raise" refuses it, and of a batch tells which
-    state; "nan" puts NaN there (`singular` tells where), and other states have what they have alone, to rounding; "damped" has at every
-    state singular values of W/d, d what each direction has alone, of `damping` at least: Λ = d⁻¹U σ₊⁻² U*d⁻¹, σ₊ = max(σ, damping), and
-    J̄ = YΛ, τ = J*Λ(...) by that, finite everywhere and unchanged where σ > damping. A direction that moves nothing at all takes no force.
+    At a state where not all directions can move independently Λ does not exist. on_singular="raise" refuses it, in a batch with the number
+    of the state; "nan" returns NaN there (`singular` marks these states), and other states have the values that they have alone, to
+    rounding; "damped" uses at every state singular values of W/d, d the value of each direction alone, of at least `damping`: Λ = d⁻¹U σ₊⁻²
+    U*d⁻¹, σ₊ = max(σ, damping), and accordingly J̄ = YΛ, τ = J*Λ(...), finite everywhere and unchanged where σ > damping. A direction that
+    moves nothing at all carries no force.
 
     Attributes
     ----------
-    names : of the directions, "hand.x"
+    names : names of the directions, "hand.x"
     jacobian : (k, nv), of the directions
     velocity : (k,), J v
     """
@@ -81,13 +83,13 @@ class TaskSpace(Closed):
         self._q, self._v = (np.broadcast_to(x, (*self._batch, x.shape[-1])) for x in (q, v))
         self._jacobian = self._stacked([rows @ J for rows, J in zip(self._directions.values(), whole, strict=True)])
         self._rate = self._stacked(rates)
-        # of each direction what its row is a sum of, so that rounding in place of no motion is told from motion
+        # size of the terms in the row of each direction, to distinguish rounding of no motion from motion
         halves = [np.abs(J).reshape(*J.shape[:-2], 2, 3 * model.nv).max(axis=-1, initial=0.0) for J in whole]  # angular, linear
         sizes = [np.repeat(half, 3, axis=-1)[..., None] for half in halves]
         self._size = self._stacked([np.abs(rows) @ size for rows, size in zip(self._directions.values(), sizes, strict=True)])[..., 0]
 
     def _stacked(self, parts: Sequence[np.ndarray]) -> np.ndarray:
-        """Arrays of the frames, one below the other, for every state."""
+        """Return the arrays of the frames stacked, for every state."""
         return np.concatenate([np.broadcast_to(x, (*self._batch, *x.shape[-2:])) for x in parts], axis=-2)
 
     @property
@@ -108,7 +110,7 @@ class TaskSpace(Closed):
     # ------------------------------------------------------------------ through the articulated bodies
     @cached_property
     def _by_recursion(self) -> np.ndarray | None:
-        """C B*ΩB C* (..., k, k); None where kernels are not sure."""
+        """Return C B*ΩB C* (..., k, k); None if kernels are unreliable."""
         found = self._model._calls().operational_space(False, list(self._directions), self._q)
         if found is None:
             return None
@@ -121,7 +123,7 @@ class TaskSpace(Closed):
 
     @cached_property
     def _factor(self) -> np.ndarray | None:
-        """R (..., k, k), Λ = R*R; None where the decomposition is asked, of all states of a batch."""
+        """Return R (..., k, k), Λ = R*R; None if the decomposition is needed, for all states of a batch."""
         compliance = None if self._damping else self._by_recursion
         if compliance is None or not self._moving.all():
             return None
@@ -138,12 +140,12 @@ class TaskSpace(Closed):
 
     @property
     def _moving(self) -> np.ndarray:
-        """Which directions move at all, (..., k): rows of J that are more than the rounding of what they are sums of."""
+        """Directions that move at all, (..., k): rows of J above the rounding of the terms of their sums."""
         return np.abs(self._jacobian).max(axis=-1, initial=0.0) > 64 * max(self._model.nv, 6) * np.finfo(float).eps * self._size
 
     @cached_property
     def _answers(self) -> np.ndarray:
-        """Y = (ℳ + J_rotors)⁻¹J* (..., nv, k)."""
+        """Return Y = (ℳ + J_rotors)⁻¹J* (..., nv, k)."""
         H, phi, M, J = self._model.soa("H phi M J")
         inverse = (H @ phi @ M @ phi.T @ H.T + J).inv()
         return np.asarray(inverse.at(self._q) @ np.swapaxes(self._jacobian, -1, -2))
@@ -151,36 +153,36 @@ class TaskSpace(Closed):
     # ------------------------------------------------------------------ the decomposition
     @cached_property
     def _parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """L⁻* (..., nv, nv), units d (..., k), and U, σ, V* of W/d."""
+        """Return L⁻* (..., nv, nv), units d (..., k), and U, σ, V* of W/d."""
         lower = cholesky(
-            self._model.mass_matrix(self._q), f"the mass matrix of {self._model.name!r}", "no task space by its Cholesky factor"
+            self._model.mass_matrix(self._q), f"the mass matrix of {self._model.name!r}", "the task space needs its Cholesky factor"
         )
         back = np.swapaxes(np.linalg.solve(lower, np.broadcast_to(np.eye(lower.shape[-1]), lower.shape)), -1, -2)
         W = self._jacobian @ back
         units = np.linalg.norm(W, axis=-1)
         size = np.abs(self._jacobian).max(axis=-1, initial=0.0) * np.abs(back).max(axis=(-1, -2), initial=0.0)[..., None]
         moving = self._moving & (units > 64 * W.shape[-1] * np.finfo(float).eps * size)
-        units = np.where(moving, units, np.inf)  # of what does not move at all: no row
+        units = np.where(moving, units, np.inf)  # a direction that does not move at all has no row
         U, sigma, Vt = np.linalg.svd(W / units[..., None], full_matrices=False)
         return back, units, U, sigma, Vt
 
     @cached_property
     def _kept(self) -> np.ndarray:
-        """Which singular values are more than rounding."""
+        """Singular values above rounding."""
         sigma = self._parts[3]
         return sigma > 16 * max(sigma.shape[-1], self._model.nv) * np.finfo(float).eps * sigma.max(axis=-1, initial=0.0)[..., None]
 
     @property
     def rank(self) -> Any:
-        """How many directions can move independently: an integer, of a batch (B,)."""
+        """Number of directions that can move independently: an integer, for a batch (B,)."""
         count = np.full(self._batch, len(self._names)) if self._factor is not None else self._kept.sum(axis=-1)
         return int(count) if count.ndim == 0 else count
 
     @property
     def lost(self) -> Any:
-        """What cannot move: a list of combinations of directions, each a dictionary from names to shares; of a batch a list of such lists.
+        """Lost directions: a list of combinations of directions, each a dictionary from names to shares; for a batch a list of such lists.
 
-        Combinations are those of the directions in their units: a motion along one of them is no motion of the mechanism.
+        Combinations are of the directions in their units: the mechanism cannot move along any of them.
         """
         if self._factor is not None:
             return [[] for _ in range(self._batch[0])] if self._batch else []
@@ -202,11 +204,11 @@ class TaskSpace(Closed):
 
     @property
     def singular(self) -> Any:
-        """Whether some directions cannot move independently, to rounding: a bool, of a batch (B,)."""
+        """True if some directions cannot move independently, to rounding: a bool, for a batch (B,)."""
         return self.rank < len(self._names)
 
     def _pseudo_inverse(self) -> np.ndarray:
-        """W⁺ (..., nv, k); damped, V σ/σ₊² U*/d."""
+        """Return W⁺ (..., nv, k); damped, V σ/σ₊² U*/d."""
         _, units, U, sigma, Vt = self._parts
         if self._damping:
             inverse = sigma / np.maximum(sigma, self._damping) ** 2
@@ -215,30 +217,30 @@ class TaskSpace(Closed):
         return self._shown(np.swapaxes(Vt, -1, -2) * inverse[..., None, :] @ np.swapaxes(U, -1, -2) / units[..., None, :], 2)
 
     def _shown(self, of: np.ndarray, axes: int) -> np.ndarray:
-        """NaN at singular states where that is asked."""
+        """Put NaN at singular states if requested."""
         if not self._masked or self._factor is not None:
             return of
         return np.where(np.reshape(self.singular, (*self._batch, *[1] * axes)), np.nan, of)
 
     def _inertia(self) -> np.ndarray:
-        """Λ (..., k, k) as far as it goes: by the factor, damped, or of what moves."""
+        """Return Λ (..., k, k): by the factor, damped, or for the directions that move."""
         if (inverse := self._factor) is not None:
             return np.swapaxes(inverse, -1, -2) @ inverse
         if self._damping:
             _, units, U, sigma, _ = self._parts
             turned = U / (units[..., :, None] * np.maximum(sigma, self._damping)[..., None, :])
             inertia = turned @ np.swapaxes(turned, -1, -2)
-            if U.shape[-1] < U.shape[-2]:  # more directions than coordinates: no motion is along what is left of them
+            if U.shape[-1] < U.shape[-2]:  # more directions than coordinates: the remaining ones do not move
                 rest = (np.eye(U.shape[-2]) - U @ np.swapaxes(U, -1, -2)) / self._damping**2
                 inertia = inertia + rest / (units[..., :, None] * units[..., None, :])
             return inertia
         inverse = self._pseudo_inverse()
         return np.swapaxes(inverse, -1, -2) @ inverse
 
-    # ------------------------------------------------------------------ what follows
+    # ------------------------------------------------------------------ results
     @property
     def compliance(self) -> np.ndarray:
-        """Λ⁻¹ = J(ℳ + J)⁻¹J* (k, k): accelerations by forces."""
+        """Return Λ⁻¹ = J(ℳ + J)⁻¹J* (k, k): accelerations by forces."""
         if self._by_recursion is not None:
             return self._by_recursion
         W = self._jacobian @ self._parts[0]
@@ -246,7 +248,7 @@ class TaskSpace(Closed):
 
     @property
     def inertia(self) -> np.ndarray:
-        """Λ (k, k). SingularOperatorError where not all directions can move independently, with those that cannot, by "raise"."""
+        """Return Λ (k, k). SingularOperatorError with "raise" if not all directions can move independently, with the lost ones."""
         if self._factor is None:
             self._require_full("Λ")
         return self._inertia()
@@ -258,7 +260,7 @@ class TaskSpace(Closed):
         if short.any():
             b = int(short.argmax())
             lost, at = (self.lost, "this state") if not self._batch else (self.lost[b], f"state {b} of a batch of {len(short)}")
-            more = "; on_singular='nan' or 'damped' goes on with the others" if self._batch else ""
+            more = "; on_singular='nan' or 'damped' keeps the other states" if self._batch else ""
             raise _core.SingularOperatorError(
                 f"{what} does not exist at {at}: of {', '.join(self._names)} no motion along {told(lost)}{more}"
             )
@@ -266,7 +268,8 @@ class TaskSpace(Closed):
     # ------------------------------------------------------------------ derivatives
     @property
     def jacobian_derivative(self) -> np.ndarray:
-        """∂J (k, nv, nv), the last axis the coordinate that it is along, on ball and free hinges a quasi-velocity. O(N + depth²)."""
+        """Return ∂J (k, nv, nv), the last axis the coordinate of the derivative, on ball and free hinges a quasi-velocity. O(N +
+        depth²)."""
         parts = [
             np.einsum("ij,...jkl->...ikl", rows, self._model.jacobian_derivative(of, self._q)) for of, rows in self._directions.items()
         ]
@@ -274,9 +277,9 @@ class TaskSpace(Closed):
 
     @property
     def compliance_derivative(self) -> np.ndarray:
-        """∂(Λ⁻¹) = ∂J Y + (∂J Y)* - Y*∂ℳ Y (k, k, nv), the last axis the coordinate.
+        """Return ∂(Λ⁻¹) = ∂J Y + (∂J Y)* - Y*∂ℳ Y (k, k, nv), the last axis the coordinate.
 
-        Y*∂ℳ are second derivatives of inverse dynamics, by q and v̇, of the power of Y: O(N nv k).
+        Y*∂ℳ are second derivatives of inverse dynamics, by q and v̇, contracted with Y: O(N nv k).
         """
         Y, states = self._answers, self._batch or (1,)
         n, k = Y.shape[-2:]
@@ -290,55 +293,55 @@ class TaskSpace(Closed):
 
     @property
     def inertia_derivative(self) -> np.ndarray:
-        """∂Λ = -Λ ∂(Λ⁻¹) Λ (k, k, nv), the last axis the coordinate. SingularOperatorError as `inertia`; damped it is refused."""
+        """Return ∂Λ = -Λ ∂(Λ⁻¹) Λ (k, k, nv), the last axis the coordinate. SingularOperatorError as `inertia`; refused if damped."""
         if self._damping:
-            raise _core.EvaluationError("a damped Λ has no derivative where singular values cross the damping; take on_singular='nan'")
+            raise _core.EvaluationError("a damped Λ has no derivative where singular values cross the damping; use on_singular='nan'")
         inertia = self.inertia
         return -np.einsum("...ij,...jkl,...km->...iml", inertia, self.compliance_derivative, inertia)
 
     @property
     def dynamically_consistent_inverse(self) -> np.ndarray:
-        """J̄ (nv, k): the velocities of least kinetic energy that move the nodes so; where directions are lost, along the others."""
+        """Return J̄ (nv, k): the velocities of least kinetic energy that move the nodes so; if directions are lost, along the others."""
         if self._factor is not None:
             return self._answers @ self.inertia
         return self._parts[0] @ self._pseudo_inverse()
 
     @property
     def null_space(self) -> np.ndarray:
-        """N = 1 - J̄J (nv, nv): velocities that move the nodes along no direction are Nv; N*τ are hinge forces that accelerate none."""
+        """Return N = 1 - J̄J (nv, nv): velocities Nv do not move the nodes along any direction; hinge forces N*τ do not accelerate them."""
         return np.eye(self._model.nv) - self.dynamically_consistent_inverse @ self._jacobian
 
     def bias(self, tau: Any = None) -> np.ndarray:
-        """J v̇₀ + J̇v (k,): accelerations without forces on the nodes, under hinge forces τ (zero where left out) and gravity."""
+        """Return J v̇₀ + J̇v (k,): accelerations without forces on the nodes, under hinge forces τ (default: zero) and gravity."""
         vdot = self._model.forward_dynamics(self._q, self._v, tau)
         return np.einsum("...ij,...j->...i", self._jacobian, vdot) + np.einsum("...ij,...j->...i", self._rate, self._v)
 
     def acceleration(self, force: Any, tau: Any = None) -> np.ndarray:
-        """ẍ (k,) under forces F (k,) on the nodes, and τ: forward dynamics of the task."""
+        """Return ẍ (k,) under forces F (k,) on the nodes, and τ: forward dynamics of the task."""
         return np.einsum("...ij,...j->...i", self.compliance, self._vector(force, "force")) + self.bias(tau)
 
     def force(self, acceleration: Any, tau: Any = None) -> np.ndarray:
-        """F (k,) on the nodes that gives them ẍ: inverse dynamics of the task. SingularOperatorError as `inertia`."""
+        """Return the forces F (k,) on the nodes that produce ẍ: inverse dynamics of the task. SingularOperatorError as `inertia`."""
         return np.einsum("...ij,...j->...i", self.inertia, self._vector(acceleration, "acceleration") - self.bias(tau))
 
     def torques(self, acceleration: Any, tau: Any = None) -> np.ndarray:
-        """Hinge forces (nv,) that give the nodes ẍ and are τ else: N*τ + J*Λ(ẍ - J̇v + J(ℳ + J)⁻¹𝒞), with the bias forces 𝒞.
+        """Return hinge forces (nv,) that give the nodes ẍ and otherwise equal τ: N*τ + J*Λ(ẍ - J̇v + J(ℳ + J)⁻¹𝒞), with the bias forces 𝒞.
 
-        SingularOperatorError where an acceleration is asked for along what cannot move.
+        SingularOperatorError for an acceleration along a lost direction.
         """
         wanted = self._vector(acceleration, "acceleration")
         short = wanted - self.bias(tau)
         force = np.einsum("...ij,...j->...i", self._inertia(), short)
         left = short - np.einsum("...ij,...j->...i", self.compliance, force)
         if not self._masked and np.any(np.abs(left) > 1e-8 * np.maximum(1.0, np.abs(wanted).max(initial=0.0))):
-            self._require_full("an acceleration with parts along what cannot move")
+            self._require_full("an acceleration with parts along lost directions")
         given = np.zeros(self._model.nv) if tau is None else np.asarray(tau, float)
         return given + np.einsum("...ji,...j->...i", self._jacobian, force)
 
     def _vector(self, given: Any, what: str) -> np.ndarray:
         x = _core.real_array(given, what)
         if x.ndim == 0 or x.shape[-1] != len(self._names):
-            raise _core.ModelError(f"{what} takes {len(self._names)} numbers, of {', '.join(self._names)}; it has shape {x.shape}")
+            raise _core.ModelError(f"{what} takes {len(self._names)} values, of {', '.join(self._names)}; it has shape {x.shape}")
         if bad := first_not_finite(x):
             raise _core.ModelError(f"{what}: entry {self._names[bad[0][0]]!r} is not finite{bad[2]}")
         return x
@@ -349,7 +352,7 @@ class TaskSpace(Closed):
 
 
 def told(lost: Iterable[Mapping[str, float]]) -> str:
-    """Directions in words: "hand.x", "hand.x - 0.5 hand.rz"."""
+    """Return directions in words: "hand.x", "hand.x - 0.5 hand.rz"."""
     each = []
     for named in lost:
         parts = [
@@ -364,17 +367,17 @@ class TaskSpaceCalls:
     """The task space of nodes."""
 
     def task_space(self, frames: Any, q=None, v=None, *, on_singular: str = "raise", damping: float = 0.02) -> TaskSpace:
-        """The motion of bodies and nodes along directions: inertia, inverse, null space, forward and inverse dynamics.
+        """Return the motion of bodies and nodes along directions: inertia, inverse, null space, forward and inverse dynamics.
 
         Parameters
         ----------
         frames : a name, a list of names, or a dictionary from names to directions
-            Directions are names among "rx", "ry", "rz", "x", "y", "z", or rows (k, 6) of their own, in the frame's axes, angular first.
+            Directions are names among "rx", "ry", "rz", "x", "y", "z", or user-defined rows (k, 6), in the frame's axes, angular first.
         q, v : (nq,), (nv,), each with an optional leading batch axis
         on_singular : {"raise", "nan", "damped"}
-            What becomes of states at which not all directions can move independently: an error with the state's number, NaN there, or
-            singular values of `damping` at least (A. Maciejewski, C. Klein, J. Robotic Systems 5, 1988: numerical filtering).
-        damping : the least singular value of W/d that counts, of 1 for directions that do not share their motion
+            At states where not all directions can move independently: raise an error with the state's number, return NaN, or use singular
+            values of at least `damping` (A. Maciejewski, C. Klein, J. Robotic Systems 5, 1988: numerical filtering).
+        damping : the least singular value of W/d, 1 for directions that do not share their motion
 
         Returns
         -------
@@ -383,7 +386,7 @@ class TaskSpaceCalls:
         Raises
         ------
         ModelError
-            Names that are not there, a frame named twice, directions that are none, or dependent ones.
+            Unknown names, a frame named twice, invalid or dependent directions.
 
         Source: task (operational) space by the operator Ω [Jain 2011]; O. Khatib, A unified approach for motion and force control of robot
         manipulators: the operational space formulation, IEEE J. Robotics and Automation 3 (1987).
@@ -410,7 +413,7 @@ def _listed(frames: Any) -> list[tuple[str, Any]]:
         pairs = [(one, TWIST) for one in several(frames)]
     named = [(text(getattr(frame, "name", frame), "a frame"), directions) for frame, directions in pairs]
     if not named:
-        raise _core.ModelError("a task space of no frames: name one body or node at least")
+        raise _core.ModelError("a task space needs frames: name at least one body or node")
     for i, (frame, _) in enumerate(named):
         if frame in [other for other, _ in named[:i]]:
             raise _core.ModelError(f"frame {frame!r} is named twice; give its directions together, as {{{frame!r}: ['x', 'y']}}")
@@ -430,11 +433,9 @@ def _rows(frame: str, directions: Any) -> tuple[np.ndarray, list[str]]:
     if not np.isfinite(rows).all():
         raise _core.ModelError(f"directions of {frame!r}: row {int(np.argwhere(~np.isfinite(rows))[0, 0])} is not finite")
     if np.linalg.matrix_rank(rows) < len(rows):
-        raise _core.ModelError(f"directions of {frame!r}: the {len(rows)} rows are linearly dependent; leave out what the others say")
+        raise _core.ModelError(f"directions of {frame!r}: the {len(rows)} rows are linearly dependent; omit the redundant ones")
     sizes = np.abs(rows).max(axis=1)
     if (out := (sizes < 1 / LARGEST_ROW) | (sizes > LARGEST_ROW)).any():
         row = int(out.argmax())
-        raise _core.ModelError(
-            f"directions of {frame!r}: row {row}, of size {sizes[row]:.3g}, leaves the range of numbers: take other units"
-        )
+        raise _core.ModelError(f"directions of {frame!r}: row {row}, of size {sizes[row]:.3g}, overflows: use other units")
     return rows, [f"{frame}.{i}" for i in range(len(rows))]

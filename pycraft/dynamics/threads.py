@@ -1,6 +1,6 @@
-"""Batches shared out over threads: the core computes outside the GIL, each part in a workspace of its own.
+"""Distribution of batches over threads: the core computes outside the GIL, each part in its own workspace.
 
-Of one state, calls that cost O(N) share out the subtrees of a large tree; the core does that.
+For one state, calls of cost O(N) distribute the subtrees of a large tree; the core does that.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from .. import _core
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_PACK = 16  # states: as many as any kernel takes at once, so that every state has the bits that it has with one thread
-_PARTS = 4  # for each thread, so that a slow one holds up no more than a part
+_PACK = 16  # states: the largest pack of any kernel, so that every state has the same bits as with one thread
+_PARTS = 4  # per thread, so that a slow one delays only a part
 
 
 def over_threads(method: F) -> F:
-    """Gives a call its `threads=`: with more than one, the states of a batch are shared out. The call itself is told of a single state."""
+    """Add `threads=` to a call: with more than one, the states of a batch are distributed. A single state is passed to the call itself."""
     names = [n for n, p in inspect.signature(method).parameters.items() if p.kind is p.POSITIONAL_OR_KEYWORD and n != "self"]
 
     @functools.wraps(method)
     def call(self: Any, *given: Any, threads: int = 1, **options: Any) -> Any:
         count = thread_count(threads)
-        if count == 1:  # nothing to look at
+        if count == 1:  # nothing to distribute
             return method(self, *given, **options)
-        # What can be gone through once alone, every thread goes through.
+        # An iterator can be consumed only once, but every thread reads the arguments.
         given = tuple(list(x) if isinstance(x, Iterator) else x for x in given)
         options = {name: list(x) if isinstance(x, Iterator) else x for name, x in options.items()}
         bound = functools.partial(method, self)
@@ -41,7 +41,7 @@ def over_threads(method: F) -> F:
 
 
 def thread_count(threads: Any) -> int:
-    """The number of threads asked for, checked; also that of `Operator.at`."""
+    """Return the number of threads, checked; also for `Operator.at`."""
     count = 0
     if not isinstance(threads, (bool, np.bool_)):
         try:
@@ -49,7 +49,7 @@ def thread_count(threads: Any) -> int:
         except TypeError:
             count = 0
     if not 1 <= count <= 1024:
-        raise _core.EvaluationError(f"threads={threads!r}: how many threads share the states of a batch, from 1 to 1024")
+        raise _core.EvaluationError(f"threads={threads!r}: the number of threads for the states of a batch, from 1 to 1024")
     return count
 
 
@@ -61,7 +61,7 @@ def shared_out(
     threads: int,
     whole: Callable[[], Any] | None = None,
 ) -> Any:
-    """The call on parts of the batch; whatever is no batch, and every error, by the call as a whole."""
+    """Call the method on parts of the batch; for anything but a batch, and for errors, call it as a whole."""
     whole = whole or functools.partial(call, *given, **options)
     bound = {**dict(zip(names, given, strict=False)), **{n: x for n, x in options.items() if n in names}}
     rest = {n: x for n, x in options.items() if n not in names and n != "out"}
@@ -77,7 +77,7 @@ def shared_out(
     if states <= length:
         return whole()
     if out is not None and any(np.shares_memory(out, a) for a in arrays.values()):
-        return whole()  # parts would read what others have written
+        return whole()  # parts would read results of others
 
     def part(start: int) -> Any:
         rows = slice(start, start + length)
@@ -88,11 +88,11 @@ def shared_out(
     parts: list[Any] = []
     try:
         parts += pool.map(part, range(0, states, length))
-    except Exception:  # of a part, which knows its states by other numbers: the call as a whole says what is wrong
+    except Exception:  # parts number their states differently: the call as a whole raises the error
         pool.shutdown(cancel_futures=True)
         return whole()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)  # an interrupt waits for no more than the parts in work
+        pool.shutdown(wait=False, cancel_futures=True)  # an interrupt waits only for running parts
     if out is not None:
         return out
     if isinstance(parts[0], tuple):

@@ -9,15 +9,15 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Trajectory:
-    """States of a model over time, and what they cost.
+    """States of a model over time, and the cost of computing them.
 
     Attributes
     ----------
-    t : (T,) s, the times asked for
+    t : (T,) s, the requested times
     q, v : (T, nq), (T, nv), the states at them; the first is the initial one
     evaluations : evaluations of forward dynamics
     seconds : wall time
-    steps, rejected : steps taken, and steps tried in vain (0 for solvers of other packages, which do not tell)
+    steps, rejected : steps taken, and rejected steps (0 for solvers of other packages, which do not report them)
     """
 
     t: np.ndarray

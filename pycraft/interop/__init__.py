@@ -1,4 +1,4 @@
-"""Other tools' conventions: SciPy, Pinocchio, MuJoCo, Drake. The only place that knows them; none is imported before it is used."""
+"""Other tools' conventions: SciPy, Pinocchio, MuJoCo, Drake. No other layer knows them; each tool is imported on first use."""
 
 from . import export, mujoco, pinocchio
 from .scipy import from_scipy, to_scipy

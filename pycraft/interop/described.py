@@ -1,4 +1,4 @@
-"""What the other tools' conventions ask of a model, whichever class it has."""
+"""The part of a model that conversions to other tools need, for models of any class."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class Described(Protocol):
 
 
 def described(model: Any, by: str) -> Described:
-    """The model itself. ModelError, which names the call, for what is none."""
+    """Return the model itself. ModelError, which names the call, if it is not a model."""
     if not callable(getattr(model, "description", None)):
-        hint = "; that of a scene is scene.model" if hasattr(model, "simulate") else ""
+        hint = "; a scene's model is scene.model" if hasattr(model, "simulate") else ""
         raise _core.ModelError(f"{by} takes a model, not {model!r:.60}{hint}")
     return model
 
 
 def theirs(given: Any, attribute: str, by: str, what: str) -> Any:
-    """Another tool's model, which has this attribute. ModelError, which names the call, for what is none."""
+    """Return another tool's model, recognised by this attribute. ModelError, which names the call, if it is not one."""
     if not hasattr(given, attribute):
         raise _core.ModelError(f"{by} takes {what}, not {given!r:.60}")
     return given

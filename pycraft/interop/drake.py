@@ -1,4 +1,4 @@
-"""Drake's multibody plant of a model of pins, sliders, screws and a free base, where a user has the package drake."""
+"""Drake's multibody plant of a model of pins, sliders, screws and a free base, if the package drake is installed."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .peer import Peer, PeerRefusal
 
 
 def drake_plant(model: Described) -> tuple[Any, np.ndarray, np.ndarray]:
-    """The model as a continuous plant of Drake, and where our q (nq,) and v (nv,) stand in its positions and velocities.
+    """Return the model as a continuous plant of Drake, and the places of our q (nq,) and v (nv,) in its positions and velocities.
 
-    Raises PeerRefusal for hinges other than pin, slider and screw, and for what Drake refuses.
+    Raises PeerRefusal for hinges other than pin, slider and screw, and for anything that Drake refuses.
     """
     described(model, "drake_plant")
     try:
@@ -76,7 +76,7 @@ def _build(plant: Any, model: Described) -> None:
 
 
 def drake_peer(model: Described) -> Peer:
-    """Drake's forward dynamics (articulated bodies) on the model. Raises PeerRefusal as `drake_plant` does."""
+    """Return Drake's forward dynamics (articulated bodies) on the model. Raises PeerRefusal as `drake_plant` does."""
     from importlib.metadata import version
 
     plant, of_q, of_v = drake_plant(model)

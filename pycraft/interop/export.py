@@ -1,11 +1,11 @@
-"""A model handed to other packages as it is, built body by body, and their forward dynamics on our coordinates.
+"""Convert a model to other packages, body by body, and run their forward dynamics on our coordinates.
 
-What each package cannot hold it refuses, and the text of the refusal is kept: `PeerRefusal`. None of them is imported before a function
-here is called. Numbers go over unchanged: Pinocchio and Drake take them as they are; MuJoCo reads MJCF text with 17 digits, its
-compiler told to leave masses and inertias alone (it turns every inertia that is not diagonal into principal axes, though).
+Features that a package lacks raise `PeerRefusal` with its text. No package is imported before a function here is called. Values are passed
+unchanged: Pinocchio and Drake take them as they are; MuJoCo reads MJCF text with 17 digits, with its compiler set to keep masses and
+inertias (it turns every inertia that is not diagonal into principal axes, though).
 
-A multi-coordinate hinge becomes Pinocchio's composite joint, or MuJoCo's several joints on one body, of the same subhinges in the same
-order about the same points, so that coordinates mean the same numbers.
+A multi-coordinate hinge becomes Pinocchio's composite joint, or several MuJoCo joints on one body, of the same subhinges in the same order
+about the same points, so that coordinates have the same values.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .packages import required
 from .peer import Peer, PeerRefusal, Vector
 
 _PINOCCHIO_BYTES = 64
-"""Pinocchio's work space a coordinate cubed, measured: it holds tensors for second derivatives."""
+"""Pinocchio's workspace per coordinate cubed, measured: it holds tensors for second derivatives."""
 
 
 def _bodies(model: Described) -> list[dict[str, Any]]:
@@ -36,9 +36,9 @@ def _bodies(model: Described) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class PinocchioModel:
-    """Pinocchio's model with the order of its numbers: `q[..., of_q]` and `v[..., of_v]` are Pinocchio's, quaternions made unit.
+    """Pinocchio's model with its order of coordinates: `q[..., of_q]` and `v[..., of_v]` are Pinocchio's, with unit quaternions.
 
-    `bodies`: of each the joint that carries it, and where the body's frame is in the joint's.
+    `bodies`: for each the joint that carries it, and the body's frame in the joint's.
     """
 
     model: Any
@@ -49,13 +49,13 @@ class PinocchioModel:
 
     @property
     def tip(self) -> tuple[int, Any]:
-        """The joint and the place of the last body, or of the base."""
+        """Return the joint and the place of the last body, or of the base."""
         import pinocchio as pin
 
         return self.bodies[-1] if self.bodies else (0, pin.SE3.Identity())
 
     def q(self, q: Vector) -> Vector:
-        """Pinocchio's configuration (nq,) of ours."""
+        """Return Pinocchio's configuration (nq,) from ours."""
         out = np.asarray(q, float)[self.of_q]
         for at in self.quaternions:
             out[at : at + 4] /= np.linalg.norm(out[at : at + 4])
@@ -63,11 +63,11 @@ class PinocchioModel:
 
 
 def to_pinocchio(model: Described) -> PinocchioModel:
-    """The model as a `pinocchio.Model` made joint by joint, with rotor inertias as armature and the same gravity.
+    """Return the model as a `pinocchio.Model` built joint by joint, with rotor inertias as armature and the same gravity.
 
-    Of rotors that differ on a ball, or stand on a free hinge's travels, Pinocchio leaves v ×* (J v) out (docs/conventions.md).
+    For rotors that differ on a ball, or act on a free hinge's travels, Pinocchio omits v ×* (J v) (docs/conventions.md).
 
-    Raises PeerRefusal for what Pinocchio refuses. All hinge kinds go over.
+    Raises PeerRefusal for anything that Pinocchio refuses. All hinge kinds are supported.
     """
     pin, _ = required("pinocchio", "peers", "a hand-over to Pinocchio needs"), described(model, "to_pinocchio")
 
@@ -145,14 +145,14 @@ def _pinocchio_joint(subhinge: dict[str, Any]) -> Any:
 
 
 def refuse_large(nv: int) -> None:
-    """Raises PeerRefusal where Pinocchio's work space of so many coordinates takes over 2 GB."""
+    """Raise PeerRefusal if Pinocchio's workspace for that many coordinates exceeds 2 GB."""
     if _PINOCCHIO_BYTES * nv**3 > 2**31:
         size = _PINOCCHIO_BYTES * nv**3 / 2**30
         raise PeerRefusal(f"its work space of {nv} coordinates takes {size:.0f} GB (third-order tensors for derivatives)")
 
 
 def pinocchio_peer(model: Described) -> Peer:
-    """Pinocchio's articulated-body algorithm (`aba`) on the model. Raises PeerRefusal where its work space takes over 2 GB."""
+    """Return Pinocchio's articulated-body algorithm (`aba`) on the model. Raises PeerRefusal if its workspace exceeds 2 GB."""
     pin, _ = required("pinocchio", "peers", "a hand-over to Pinocchio needs"), described(model, "pinocchio_peer")
 
     refuse_large(model.nv)
@@ -177,7 +177,7 @@ _JOINTS = {"pin": "hinge", "slider": "slide", "ball": "ball"}
 
 
 def to_mjcf(model: Described) -> str:
-    """The model as MJCF text for comparisons: `mjcf_elements`, contacts and constraints off. `Multibody.save` writes files."""
+    """Return the model as MJCF text for comparisons: `mjcf_elements`, contacts and constraints off. `Multibody.save` writes files."""
     from lxml import etree
 
     root, _ = mjcf_elements(model)
@@ -186,10 +186,10 @@ def to_mjcf(model: Described) -> str:
 
 
 def mjcf_elements(model: Described) -> tuple[Any, list[Any]]:
-    """The model's `<mujoco>` element, and in it the elements of its bodies, in order: joints, inertias with 17 digits, no geometry.
+    """Return the model's `<mujoco>` element, with the elements of its bodies, in order: joints, inertias with 17 digits, no geometry.
 
-    Raises PeerRefusal for a screw, for a free hinge that is not alone on the base, and for rotor inertias that differ within a ball or
-    free hinge: MuJoCo has none of them.
+    Raises PeerRefusal for a screw, for a free hinge that is not alone on the base, and for different rotor inertias within a ball or free
+    hinge: MuJoCo supports none of them.
     """
     from lxml import etree
 
@@ -218,7 +218,7 @@ def mjcf_elements(model: Described) -> tuple[Any, list[Any]]:
 
 
 def inertia_attribute(inertia: np.ndarray) -> tuple[str, str]:
-    """The attribute of `<inertial>` that holds an inertia (3, 3), and its text."""
+    """Return the attribute of `<inertial>` for an inertia (3, 3), and its text."""
     if np.count_nonzero(inertia - np.diag(np.diag(inertia))):
         return "fullinertia", numbers_text(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     return "diaginertia", numbers_text(np.diag(inertia))
@@ -244,16 +244,16 @@ def _mujoco_joint(element: Any, hinge: dict, i: int, subhinge: dict, rotor: np.n
 
 
 def numbers_text(values: Any) -> str:
-    """Numbers as attributes of XML have them, with all their digits."""
+    """Return values as an XML attribute, with all their digits."""
     return " ".join(repr(float(x)).removesuffix(".0") for x in np.ravel(values))
 
 
 def mujoco_peer(model: Described) -> Peer:
-    """MuJoCo's forward dynamics (`mj_forward`, constraints off) on the model. Raises PeerRefusal with the compiler's text."""
+    """Return MuJoCo's forward dynamics (`mj_forward`, constraints off) on the model. Raises PeerRefusal with the compiler's text."""
     import mujoco
 
     said: list[str] = []
-    mujoco.set_mju_user_warning(said.append)  # or they go to a file in the working directory; the compiler warns, too
+    mujoco.set_mju_user_warning(said.append)  # otherwise they go to a file in the working directory; the compiler also warns
     try:
         twin = mujoco.MjModel.from_xml_string(to_mjcf(model))
     except ValueError as error:
@@ -265,7 +265,7 @@ def mujoco_peer(model: Described) -> Peer:
         data.qpos, data.qvel = convention.to_mujoco(model, q, v)
         T = convention.velocity_map(model, q) if turned else None
         data.qfrc_applied = tau if T is None else T @ tau
-        mujoco.set_mju_user_warning(said.append)  # it is the package's, not a model's
+        mujoco.set_mju_user_warning(said.append)  # the callback belongs to the package, not to a model
         mujoco.mj_forward(twin, data)
         if T is None:
             return np.array(data.qacc)
@@ -278,7 +278,7 @@ def mujoco_peer(model: Described) -> Peer:
 
 
 def installed() -> dict[str, Callable[[Described], Peer]]:
-    """What makes a peer of a model, by the name of each package that can be imported: Pinocchio, MuJoCo, Drake."""
+    """Return functions that make a peer of a model, by the name of each package that can be imported: Pinocchio, MuJoCo, Drake."""
     from importlib.util import find_spec
 
     makers = {"pinocchio": ("Pinocchio", pinocchio_peer), "mujoco": ("MuJoCo", mujoco_peer), "pydrake": ("Drake", drake_peer)}

@@ -1,4 +1,4 @@
-"""MuJoCo's coordinates: the order and the axes in which it keeps the state of free hinges. Only `compiled` needs MuJoCo itself.
+"""MuJoCo's coordinates: the order and the axes of the state of free hinges. Only `compiled` needs MuJoCo itself.
 
                   here                                      MuJoCo
 free, position    (w, x, y, z, x, y, z), in the parent      (x, y, z, w, x, y, z), in the world
@@ -6,8 +6,7 @@ free, velocity    twist in the body's axes: (ω; v)          (v; ω), v in world
 ball              (w, x, y, z); ω in the body's axes        the same
 all others        one number per coordinate                 the same
 
-Hinges are taken to come in MuJoCo's order, as they do in a model that was loaded from an MJCF file. Free hinges are on the
-base, as MuJoCo has them nowhere else.
+Hinges must be in MuJoCo's order, as in a model loaded from an MJCF file. Free hinges are on the base, as MuJoCo requires.
 """
 
 from __future__ import annotations
@@ -31,17 +30,17 @@ def compiled(path: str, prepare: Callable[[Any], None] | None = None) -> Any:
     ----------
     path : path of the file
     prepare : function of the `MjSpec`, optional
-        Changes the parsed file before it is compiled.
+        Modifies the parsed file before it is compiled.
 
     Raises
     ------
     MissingPackageError
         The mujoco package is not installed: names the extra.
     ModelError
-        What MuJoCo refuses, in its words.
+        Anything that MuJoCo refuses, in its words.
     """
     if not isinstance(path, (str, Path)):
-        raise _core.ModelError(f"an MJCF file is named by its path, not by {path!r:.60}")
+        raise _core.ModelError(f"an MJCF file is given by its path, not by {path!r:.60}")
     mujoco, path = required("mujoco", "mjcf", f"{path}: MJCF files are read by"), str(path)
     try:
         spec = mujoco.MjSpec.from_file(path)
@@ -53,7 +52,7 @@ def compiled(path: str, prepare: Callable[[Any], None] | None = None) -> Any:
             raise
         said = " ".join(str(error).split())
         found = re.search(r", line (\d+)$", said)
-        whole = found is not None and b"<include" not in Path(path).read_bytes()  # or the line may be another file's
+        whole = found is not None and b"<include" not in Path(path).read_bytes()  # else the line may belong to another file
         raise _core.ModelError(f"{path}{f':{found[1]}' if found and whole else ''}: MuJoCo refuses the file: {said}") from None
 
 
@@ -65,7 +64,7 @@ def disabled(compiled_model: Any, feature: str) -> bool:
 
 
 class _Free(NamedTuple):
-    """Where a free hinge's numbers start in q and v, and the pose (4, 4) of its inboard frame in the world."""
+    """The places of a free hinge in q and v, and the pose (4, 4) of its inboard frame in the world."""
 
     q: int
     v: int
@@ -83,9 +82,9 @@ def _free_hinges(model: Described) -> Iterator[_Free]:
 
 
 def permutation(model: Described) -> tuple[np.ndarray, np.ndarray]:
-    """The order of MuJoCo's numbers: `q[..., i]` is qpos and `v[..., j]` is in the order of qvel, i (nq,) and j (nv,).
+    """Return MuJoCo's order of coordinates: `q[..., i]` is qpos and `v[..., j]` is in the order of qvel, i (nq,) and j (nv,).
 
-    This is the whole conversion of positions where free hinges are placed at the world's origin; linear velocities of free
+    This is the whole conversion of positions if free hinges are placed at the world's origin; linear velocities of free
     hinges must be turned as well: see `to_mujoco`. Raises ModelError for a free hinge that is not on the base.
     """
     free_hinges = list(_free_hinges(model))
@@ -97,7 +96,7 @@ def permutation(model: Described) -> tuple[np.ndarray, np.ndarray]:
 
 
 def to_mujoco(model: Described, q, v) -> tuple[np.ndarray, np.ndarray]:
-    """qpos (..., nq) and qvel (..., nv) of the state q (..., nq), v (..., nv).
+    """Return qpos (..., nq) and qvel (..., nv) of the state q (..., nq), v (..., nv).
 
     Raises ModelError for a free hinge that is not on the base.
 
@@ -123,7 +122,7 @@ def to_mujoco(model: Described, q, v) -> tuple[np.ndarray, np.ndarray]:
 
 
 def from_mujoco(model: Described, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
-    """The state q (..., nq), v (..., nv) of MuJoCo's qpos (..., nq), qvel (..., nv): the inverse of `to_mujoco`."""
+    """Return the state q (..., nq), v (..., nv) of MuJoCo's qpos (..., nq), qvel (..., nv): the inverse of `to_mujoco`."""
     i, j = permutation(model)
     qpos, qvel = _sized(model, qpos, model.nq, "qpos"), _sized(model, qvel, model.nv, "qvel")
     q, v = np.empty(qpos.shape), np.empty(qvel.shape)
@@ -140,7 +139,7 @@ def from_mujoco(model: Described, qpos, qvel) -> tuple[np.ndarray, np.ndarray]:
 
 
 def velocity_map(model: Described, q) -> np.ndarray:
-    """T (nv, nv), orthogonal, with qvel = T v at the state q (nq,).
+    """Return T (nv, nv), orthogonal, with qvel = T v at the state q (nq,).
 
     Forces follow by duality, qfrc = T tau, and MuJoCo's mass matrix is T (ℳ + J) T*.
     """
@@ -149,9 +148,9 @@ def velocity_map(model: Described, q) -> np.ndarray:
 
 
 def acceleration_to_mujoco(model: Described, q, v, vdot) -> np.ndarray:
-    """qacc (nv,) of the accelerations vdot (nv,) at the state q (nq,), v (nv,): T v̇ + Ṫ v.
+    """Return qacc (nv,) of the accelerations vdot (nv,) at the state q (nq,), v (nv,): T v̇ + Ṫ v.
 
-    MuJoCo's linear acceleration is that of the body's origin in world axes, R(v̇ + ω × v).
+    MuJoCo's linear acceleration is the acceleration of the body's origin in world axes, R(v̇ + ω × v).
     """
     v, vdot = _sized(model, v, described(model, "acceleration_to_mujoco").nv, "v"), np.array(_sized(model, vdot, model.nv, "vdot"))
     for free in _free_hinges(model):
@@ -161,20 +160,21 @@ def acceleration_to_mujoco(model: Described, q, v, vdot) -> np.ndarray:
 
 
 def name_of(compiled_model: Any) -> str:
-    """The name of an MjModel: the first of its names."""
+    """Return the name of an MjModel: the first of its names."""
     return bytes(theirs(compiled_model, "njnt", "name_of", "an MjModel").names).split(b"\0", 1)[0].decode() or "model"
 
 
 def joint_names(hinge: Any) -> list[str]:
-    """What a hinge's joints are called in MuJoCo, one for each subhinge."""
+    """Return the names of a hinge's joints in MuJoCo, one for each subhinge."""
     return [hinge.name] if len(hinge.subhinges) == 1 else [f"{hinge.name}[{i}]" for i in range(len(hinge.subhinges))]
 
 
 def order(model: Described, compiled_model: Any) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:
-    """Where the numbers of `to_mujoco` stand in the MjModel's qpos (nq,) and qvel (nv,), and the first joint of every hinge by name.
+    """Return the places of the entries of `to_mujoco` in the MjModel's qpos (nq,) and qvel (nv,), and the first joint of every hinge by
+    name.
 
-    Hinges are matched by the name of their first joint, else by the name of the body. Raises ModelError for what only one of the two
-    has, and where the coordinates of a match differ in number.
+    Hinges are matched by the name of their first joint, else by the name of the body. Raises ModelError for a joint that only one of the
+    two has, and for matches with different numbers of coordinates.
     """
     mujoco = required("mujoco", "mjcf", "the order of MuJoCo's coordinates needs")
     theirs(compiled_model, "njnt", "order", "an MjModel")
@@ -215,15 +215,15 @@ def order(model: Described, compiled_model: Any) -> tuple[np.ndarray, np.ndarray
 def _sized(model: Described, x, size: int, name: str) -> np.ndarray:
     x = _core.real_array(x, f"{name} of {model.name!r}")
     if x.shape[-1:] != (size,):
-        raise _core.ModelError(f"{name} of {model.name!r} takes {size} numbers, not an array {x.shape}")
+        raise _core.ModelError(f"{name} of {model.name!r} takes {size} values, not an array {x.shape}")
     return x
 
 
 def _rotations(q: np.ndarray) -> np.ndarray:
-    """R(q/|q|), (..., 3, 3)."""
+    """Return R(q/|q|), (..., 3, 3)."""
     length = np.linalg.norm(q, axis=-1, keepdims=True)
     if not np.all(length > 1e-8):
-        raise _core.ModelError("a free hinge's quaternion has no direction; (1, 0, 0, 0) is no rotation")
+        raise _core.ModelError("a free hinge's quaternion has zero length; the identity is (1, 0, 0, 0)")
     w, x, y, z = np.moveaxis(q / length, -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -243,7 +243,7 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _quaternion(R: np.ndarray) -> np.ndarray:
-    """The quaternion of a rotation matrix: the eigenvector of Bar-Itzhack's matrix, well conditioned for every rotation."""
+    """Return the quaternion of a rotation matrix: the eigenvector of Bar-Itzhack's matrix, well conditioned for every rotation."""
     K = np.array(
         [
             [np.trace(R), R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],

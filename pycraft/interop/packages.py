@@ -1,4 +1,4 @@
-"""Packages that only one extra needs: imported when they are asked for, missed by name."""
+"""Packages of the extras: imported on first use, with an error that names the extra."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from .. import _core
 
 
 class MissingPackageError(_core.Error, ImportError):
-    """A package that only one extra needs is not installed."""
+    """A package of an extra is not installed."""
 
 
 def required(package: str, extra: str, what: str) -> Any:
-    """The module of a package; MissingPackageError, saying what needs it and which extra brings it, where it is not installed."""
+    """Return the module of a package; MissingPackageError, with the feature that needs it and the extra, if it is not installed."""
     try:
         return import_module(package)
     except ImportError:

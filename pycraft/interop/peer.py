@@ -1,4 +1,4 @@
-"""Another package's forward dynamics of a model of ours, and its refusal of a model."""
+"""Another package's forward dynamics of one of our models, and its refusal of a model."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Vector = np.ndarray
 
 
 class PeerRefusal(_core.ModelError):
-    """Another package does not take this model; the text says why, in the package's own words where it has some."""
+    """Another package refuses this model; the text gives the reason, in the package's own words if available."""
 
 
 @dataclass(frozen=True)
 class Peer:
-    """Another package's forward dynamics of one model: `forward_dynamics(q, v, tau)` takes (nq,), (nv,), (nv,), ours, and gives (nv,).
+    """Another package's forward dynamics of one model: `forward_dynamics(q, v, tau)` takes (nq,), (nv,), (nv,), ours, and returns (nv,).
 
-    `said` collects the warnings that it gives beside its values.
+    `said` collects its warnings.
     """
 
     name: str

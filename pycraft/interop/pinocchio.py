@@ -17,17 +17,17 @@ from .described import Described, described, theirs
 from .packages import required
 
 _SWAP = np.array([3, 4, 5, 0, 1, 2])
-"""From angular-first to linear-first order."""
+"""Permutation from angular-first to linear-first order."""
 
 
 def build(path: str, root: str = "fixed") -> Any:
-    """Pinocchio's model of a URDF file, with a free flyer for root="free"."""
+    """Return Pinocchio's model of a URDF file, with a free flyer for root="free"."""
     pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     if root not in ("fixed", "free"):
         raise _core.ModelError(f"root={root!r:.60}: there are 'fixed' and 'free'")
     if not isinstance(path, (str, Path)) or not Path(path).is_file():
-        raise _core.ModelError(f"{path!r:.60} is no file")
+        raise _core.ModelError(f"{path!r:.60} is not a file")
     try:
         return pinocchio.buildModelFromUrdf(str(path), *([pinocchio.JointModelFreeFlyer()] if root == "free" else []))
     except ValueError as error:
@@ -36,7 +36,7 @@ def build(path: str, root: str = "fixed") -> Any:
 
 @dataclass
 class Coordinates:
-    """How the coordinates of a model lie in Pinocchio's model of the same file.
+    """The coordinates of a model in Pinocchio's model of the same file.
 
     `q(q)` converts configurations, `velocities(q)` is the orthogonal matrix S with v_pinocchio = S v; so ℳ_pinocchio = S ℳ S*.
     """
@@ -46,7 +46,7 @@ class Coordinates:
     joints: list[tuple[int, str, slice, slice]]
 
     def q(self, q: np.ndarray) -> np.ndarray:
-        """A configuration (nq,) in Pinocchio's order."""
+        """Return a configuration (nq,) in Pinocchio's order."""
         out = np.zeros(self.pin_model.nq)
         for joint, _, q_slice, _ in self.joints:
             at = self.pin_model.joints[joint].idx_q
@@ -57,11 +57,11 @@ class Coordinates:
         return out
 
     def velocities(self, q: np.ndarray) -> np.ndarray:
-        """S (nv, nv): velocities of the model to Pinocchio's."""
+        """Return S (nv, nv): velocities of the model to Pinocchio's."""
         return self._by_joint(q, lambda part, own: _velocity_block(part, own))
 
     def velocity_rate(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Ṡ (nv, nv) at velocity v: zero but for planar joints, whose velocity Pinocchio gives in the body's axes."""
+        """Return Ṡ (nv, nv) at velocity v: zero except for planar joints, with velocities in the body's axes in Pinocchio."""
         rate = np.zeros((self.pin_model.nv, self.model.nv))
         if any("Planar" in name for name in self.said_names()):
             for joint, _, q_slice, v_slice in self.joints:
@@ -72,15 +72,15 @@ class Coordinates:
         return rate
 
     def joint_numbers(self) -> list[tuple[str, int]]:
-        """Hinges with their joint's number in Pinocchio, in Pinocchio's order."""
+        """Return hinges with their joint's number in Pinocchio, in Pinocchio's order."""
         return [(name, joint) for joint, name, _, _ in self.joints]
 
     def said_names(self) -> set[str]:
-        """The kinds of Pinocchio's joints."""
+        """Return the kinds of Pinocchio's joints."""
         return {_shortname(part) for joint, *_ in self.joints for part in _components(self.pin_model.joints[joint])}
 
     def said(self) -> list[str]:
-        """In what Pinocchio writes the coordinates of single joints otherwise."""
+        """Return the differences in how Pinocchio writes the coordinates of single joints."""
         found = []
         if any("Planar" in name for name in self.said_names()):
             found.append("planar: (x, y, angle) here; (x, y, cos, sin) there, velocities in the body's axes")
@@ -107,7 +107,7 @@ class Coordinates:
 
 
 _OWN_Q = {"JointModelFreeFlyer": 7, "JointModelSpherical": 4, "JointModelPlanar": 3}
-"""Numbers of q here by Pinocchio's kind of joint; one where it is not listed."""
+"""Number of entries of q here by Pinocchio's kind of joint; default: one."""
 _VELOCITIES = {"JointModelFreeFlyer": 6, "JointModelSpherical": 3, "JointModelPlanar": 3}
 
 
@@ -116,7 +116,7 @@ def _shortname(joint: Any) -> str:
 
 
 def _components(joint: Any) -> list[Any]:
-    """The joints of a composite one, in order; of any other, itself."""
+    """Return the joints of a composite one, in order; for any other, itself."""
     return list(joint.extract().joints) if _shortname(joint) == "JointModelComposite" else [joint]
 
 
@@ -125,7 +125,7 @@ def _unbounded(name: str) -> bool:
 
 
 def _configuration(joint: Any, own: np.ndarray) -> list[float]:
-    """Our numbers of one simple joint as Pinocchio writes them."""
+    """Return our coordinates of one simple joint as Pinocchio writes them."""
     name = _shortname(joint)
     if name == "JointModelFreeFlyer":
         return [*own[4:7], *_unit(own[[1, 2, 3, 0]])]
@@ -137,7 +137,7 @@ def _configuration(joint: Any, own: np.ndarray) -> list[float]:
 
 
 def _velocity_block(joint: Any, own: np.ndarray) -> np.ndarray:
-    """S of one simple joint."""
+    """Return S of one simple joint."""
     name = _shortname(joint)
     if name == "JointModelFreeFlyer":
         return np.eye(6)[_SWAP]
@@ -174,7 +174,7 @@ def coordinates(model: Described, pin_model: Any) -> Coordinates:
 
 
 def jacobian(pin_model: Any, data: Any, q: np.ndarray, frame: str) -> np.ndarray:
-    """Pinocchio's Jacobian of a link frame, in its own axes, rows brought to angular-first order."""
+    """Return Pinocchio's Jacobian of a link frame, in its own axes, with rows in angular-first order."""
     pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     index = pin_model.getFrameId(frame, pinocchio.FrameType.BODY)
@@ -182,7 +182,7 @@ def jacobian(pin_model: Any, data: Any, q: np.ndarray, frame: str) -> np.ndarray
 
 
 def derivative_calls(robot: str, floating: bool) -> dict[str, Any]:
-    """Pinocchio's derivatives of inverse and forward dynamics on a shipped robot, as calls without arguments, to be timed."""
+    """Return Pinocchio's derivatives of inverse and forward dynamics on a package robot, as calls without arguments, for timing."""
     pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     with as_file(files("pycraft.models") / "robots" / f"{robot}.urdf") as path:

@@ -1,4 +1,4 @@
-"""SciPy's linear operators, both ways."""
+"""SciPy's linear operators, in both directions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def to_scipy(operator: _core.Operator) -> LinearOperator:
-    """The operator as a `scipy.sparse.linalg.LinearOperator` with matvec, rmatvec, matmat and rmatmat; nothing is formed.
+    """Return the operator as a `scipy.sparse.linalg.LinearOperator` with matvec, rmatvec, matmat and rmatmat; nothing is formed.
 
     Examples
     --------
@@ -49,17 +49,17 @@ def to_scipy(operator: _core.Operator) -> LinearOperator:
 
 
 def from_scipy(linear_operator: Any, domain: _core.Space, codomain: _core.Space, name: str = "L") -> _core.Operator:
-    """A SciPy linear operator, sparse or dense matrix as an operator between spaces of a model.
+    """Return a SciPy linear operator, sparse or dense matrix as an operator between spaces of a model.
 
-    A `LinearOperator` is applied as it is, in double precision, and its inverse is dense (`explain()` says so); a matrix becomes a
+    A `LinearOperator` is applied as it is, in double precision, and its inverse is dense (`explain()` shows it); a matrix becomes a
     constant, which keeps its block structure.
 
-    SpaceError for another shape, and where spaces are none; ModelError for what is neither an operator nor a matrix of numbers.
+    SpaceError for another shape, and for invalid spaces; ModelError for anything but an operator or a matrix of numbers.
     """
     from scipy.sparse.linalg import LinearOperator
 
     if not isinstance(name, str):
-        raise _core.ModelError(f"an operator is called by a text, not by {name!r:.60}")
+        raise _core.ModelError(f"an operator is named by a string, not by {name!r:.60}")
     for what, space in (("domain", domain), ("codomain", codomain)):
         if not isinstance(space, _core.Space):
             raise _core.SpaceError(f"from_scipy: {what} is a space, as arm.soa.phi.{what}, not {space!r:.60}")

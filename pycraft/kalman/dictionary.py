@@ -1,11 +1,11 @@
-"""The dictionary of the book's letters and what they are of a filter, as a table in text, HTML and LaTeX."""
+"""The dictionary of the book's letters and their meaning in a filter, as a table in text, HTML and LaTeX."""
 
 from __future__ import annotations
 
 import re
 from html import escape
 
-# (LaTeX of the letter, its name in Python, what it is of the filter with LaTeX between dollars, one block)
+# (LaTeX of the letter, its name in Python, its meaning in the filter with LaTeX between dollars, shape of one block)
 _DICTIONARY = (
     ("k", "", "time step: body $k$ of $N$ is step $t = N - 1 - k$; the tip is the first step, the base the last", ""),
     (r"\mathcal{E}_\phi", "E", "transition $A_t$, from step $t$ to $t + 1$", "(n, n)"),
@@ -24,12 +24,12 @@ _DICTIONARY = (
     (r"\mathcal{E}_\psi", "E_psi", "transition of the filter: $A (I - G C)$", "(n, n)"),
     (r"\psi", "psi", r"predictions of all steps from the measurements: $z = \psi(K y + x_0)$", ""),
     ("z", "", "predicted state $x(t|t-1)$", "(n,)"),
-    (r"\epsilon = [I - H\psi\mathcal{K}]y", "(I - H@psi@K) @ y", "innovations: what each measurement tells that is new", "(m,)"),
+    (r"\epsilon = [I - H\psi\mathcal{K}]y", "(I - H@psi@K) @ y", "innovations: the new information of each measurement", "(m,)"),
     (r"\lambda = \psi^*H^*\mathcal{D}^{-1}\epsilon", "psi.T@H.T@D.inv() @ eps", "adjoint variable, backward in time", "(n,)"),
     (r"\Upsilon", "Upsilon", r"adjoint information: covariance of $\lambda$, the blocks of $\Omega$ on the diagonal", "(n, n)"),
     (r"z + P\lambda", "z + P @ lam", "smoothed state $x(t|N)$", "(n,)"),
     (r"P - P\Upsilon P", "P - P@Upsilon@P", "covariance of the smoothed state", "(n, n)"),
-    (r"\phi(M - M\Omega M)\phi^*", "posterior", "covariance of all smoothed states together, between steps too", ""),
+    (r"\phi(M - M\Omega M)\phi^*", "posterior", "covariance of all smoothed states together, including between steps", ""),
     (r"M\lambda", "M @ lam", "smoothed process noise $B w$", "(n,)"),
 )  # fmt: skip
 _UNICODE = {
@@ -39,7 +39,7 @@ _UNICODE = {
 
 
 def _plain(text: str) -> str:
-    """LaTeX as Unicode."""
+    """Return LaTeX as Unicode."""
     text = re.sub(r"(\\[A-Za-z]+) (?=[A-Z])", r"\1", text)  # the space that ends a command
     for latex, letter in _UNICODE.items():
         text = text.replace(latex, letter)
@@ -51,7 +51,7 @@ class Dictionary:
 
     @property
     def rows(self) -> list[dict[str, str]]:
-        """letter, latex, name (in Python), meaning, shape (of one block) of every entry."""
+        """Rows with letter, latex, name (in Python), meaning, shape (of one block) of every entry."""
         return [
             {"letter": _plain(latex), "latex": latex, "name": name, "meaning": _plain(meaning), "shape": shape}
             for latex, name, meaning, shape in _DICTIONARY
@@ -74,6 +74,6 @@ class Dictionary:
         return f"<table style='table-layout:auto'><tr>{titles}</tr>{cells}</table>"
 
     def latex(self) -> str:
-        """The table as a LaTeX tabular."""
+        """Return the table as a LaTeX tabular."""
         lines = [rf"${latex}$ & {meaning} \\" for latex, _, meaning, _ in _DICTIONARY]
         return "\n".join([r"\begin{tabular}{ll}", r"book & filter \\", r"\hline", *lines, r"\end{tabular}"])

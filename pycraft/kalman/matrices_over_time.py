@@ -1,4 +1,4 @@
-"""Matrices over time as they are given: their shapes, how many steps they say there are, and covariances among them."""
+"""Matrices over time: their shapes, the number of steps that they imply, and covariances."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .. import _core
 
 
 def matrices(x: Any, name: str, rows: int | None = None) -> np.ndarray:
-    """A matrix, or one per time step; a number is 1 x 1, and a vector for B one column."""
+    """Return a matrix, or one per time step; a scalar is 1 x 1, and a vector for B one column."""
     made = _core.real_array(x, name)
     if made.ndim == 0:
         made = made.reshape(1, 1)
@@ -24,7 +24,7 @@ def matrices(x: Any, name: str, rows: int | None = None) -> np.ndarray:
 
 
 def count_of_steps(given: int | None, measured: int | None, at: dict[str, np.ndarray], between: dict[str, np.ndarray]) -> int:
-    """N, and that every time axis has it."""
+    """Return N, after a check that every time axis has it."""
     said = {"steps=": given, "measurements": measured} | {name: len(x) for name, x in at.items() if x.ndim == 3}
     known: dict[str, int] = {name: count for name, count in said.items() if count is not None}
     if not known:
@@ -48,7 +48,7 @@ def over_time(x: np.ndarray, count: int) -> np.ndarray:
 
 
 def symmetric(x: np.ndarray) -> np.ndarray:
-    """To the last bit: an inertia that is asymmetric by one rounding costs digits."""
+    """Return x made symmetric to the last bit: an inertia that is asymmetric by one rounding costs digits."""
     return (x + np.swapaxes(x, -1, -2)) / 2
 
 
@@ -64,7 +64,7 @@ def require_covariance(x: np.ndarray, name: str) -> None:
 
 
 def stationary(A: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """P = APA* + BQB* of a stable model that does not change with time."""
+    """Return P = APA* + BQB* of a stable model that does not change with time."""
     if A.ndim == 3 or noise.ndim == 3 or np.abs(np.linalg.eigvals(A)).max() >= 1:
         raise _core.ModelError("P0 is needed: only a stable model that does not change with time has a stationary covariance")
     from scipy.linalg import solve_discrete_lyapunov
@@ -73,6 +73,6 @@ def stationary(A: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def roots(x: np.ndarray) -> np.ndarray:
-    """L with LL* = x, of semidefinite matrices."""
+    """Return L with LL* = x, of semidefinite matrices."""
     values, vectors = np.linalg.eigh(x)
     return vectors * np.sqrt(np.maximum(values, 0))[:, None, :]

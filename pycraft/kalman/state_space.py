@@ -21,9 +21,9 @@ _Answer = TypeVar("_Answer")
 
 @dataclass
 class Filtered:
-    """What a filter knows at each of N steps, forward in time; entries that belong to missing measurements are NaN.
+    """Results of a filter at each of N steps, forward in time; entries of missing measurements are NaN.
 
-    predicted (N, n) and predicted_covariance (N, n, n) before, filtered and filtered_covariance after the step's measurement;
+    predicted (N, n) and predicted_covariance (N, n, n) before the step's measurement, filtered and filtered_covariance after it;
     innovations (N, m), innovation_covariance (N, m, m), gain (N, n, m).
     """
 
@@ -39,9 +39,9 @@ class Filtered:
 
 @dataclass
 class Smoothed:
-    """What all measurements together say of every step: states (N, n), covariance (N, n, n), the adjoint variable λ (N, n).
+    """Estimates of every step from all measurements: states (N, n), covariance (N, n, n), the adjoint variable λ (N, n).
 
-    noise (N, n) is the smoothed process noise Bw that entered each step (at the first, the state's difference from x0).
+    noise (N, n) is the smoothed process noise Bw that entered each step (at the first step: the difference of the state from x0).
     """
 
     states: np.ndarray
@@ -51,7 +51,7 @@ class Smoothed:
 
 
 def _naming_the_step(call: Callable[..., _Answer]) -> Callable[..., _Answer]:
-    """A singular D said in the words of filters."""
+    """Report a singular D in the terms of filters."""
 
     @wraps(call)
     def said(*arguments: Any, **options: Any) -> _Answer:
@@ -79,22 +79,21 @@ def kalman(
     *,
     steps: int | None = None,
 ) -> StateSpace:
-    """The SKO model of x_{t+1} = A_t x_t + B_t w_t, y_t = C_t x_t + v_t with w ~ N(0, Q), v ~ N(0, R), for t = 0, ..., N - 1.
+    """Return the SKO model of x_{t+1} = A_t x_t + B_t w_t, y_t = C_t x_t + v_t with w ~ N(0, Q), v ~ N(0, R), for t = 0, ..., N - 1.
 
     Parameters
     ----------
     A, B, C, Q, R : (n, n), (n, p), (m, n), (p, p), (m, m), or with a leading axis over time
-        A_t, B_t, Q_t lead from step t to t + 1: N - 1 of them, one more is not used. C_t, R_t: N. B=None and C=None are identities: noise
-        enters every state, every state is measured. Q and R are always given, symmetric positive semidefinite; R may be zero where C P C*
-        is not. Numbers stand for 1 x 1 matrices.
+        A_t, B_t, Q_t lead from step t to t + 1: there are N - 1 of them, and one more is ignored. C_t, R_t: N. B=None and C=None are
+        identities: noise enters every state, every state is measured. Q and R are required, symmetric positive semidefinite; R may be zero
+        where C P C* is not. Scalars are 1 x 1 matrices.
     x0, P0 : (n,), (n, n)
-        Mean and covariance of the first state, before its measurement: zero, and the stationary covariance of a model that does not
-        change with time and is stable.
+        Mean and covariance of the first state, before its measurement. Defaults: zero, and the stationary covariance of a stable model that
+        does not change with time.
     measurements : (N, m), or (N,) where m = 1
-        NaN where one is missing. They say how many steps there are, which of them are missing in `.soa`, and are what `.filter()` takes
-        if nothing else is given.
+        NaN where one is missing. They give the number of steps, determine which rows `.soa` leaves out, and are the default of `.filter()`.
     steps : int
-        N, where neither measurements nor a time axis of C or R says it.
+        N, needed if neither measurements nor a time axis of C or R gives it.
 
     Returns
     -------
@@ -103,8 +102,8 @@ def kalman(
     Raises
     ------
     ModelError
-        A model of a mechanism in place of A, a Q or R that is left out, shapes that do not fit, a covariance that is not symmetric positive
-        semidefinite, a P0 that is needed, numbers that are not finite.
+        A model of a mechanism in place of A, a missing Q or R, shapes that do not match, a covariance that is not symmetric positive
+        semidefinite, a missing P0 that is needed, values that are not finite.
 
     Examples
     --------
@@ -126,7 +125,7 @@ _EXAMPLE = "pc.kalman(A=[[1, 0.1], [0, 1]], C=[[1, 0]], Q=0.5 * np.eye(2), R=0.2
 
 
 def _require_matrices(A: Any, Q: Any, R: Any) -> None:
-    """ModelError, with what to write, where a mechanism is given for a state-space model, or the covariances of the noises are not."""
+    """Raise ModelError, with an example, for a mechanism in place of a state-space model, or for missing covariances of the noises."""
     if isinstance(A, (_core.Multibody, OperatorSet)):
         raise _core.ModelError(
             f"kalman takes the matrices of a linear state-space model, such as {_EXAMPLE}; a mechanism runs beside the filter in "
@@ -140,7 +139,7 @@ def _require_matrices(A: Any, Q: Any, R: Any) -> None:
 
 
 class StateSpace:
-    """A linear state-space model as an SKO tree, see `kalman`.
+    """A linear state-space model as an SKO tree; see `kalman`.
 
     Attributes
     ----------
@@ -148,7 +147,7 @@ class StateSpace:
         Body "t3" is step 3; the base is the last step, so blocks and stacked vectors run backward in time.
     dictionary : Dictionary
     steps, n, m : int
-        N, size of a state, of a measurement.
+        N, size of a state, size of a measurement.
     """
 
     def __init__(self, A: Any, B: Any, C: Any, Q: Any, R: Any, x0: Any, P0: Any, measurements: Any, steps: int | None):
@@ -184,12 +183,12 @@ class StateSpace:
 
     @property
     def soa(self) -> OperatorSet:
-        """The operators: of all measurements, or of those that are not missing in the measurements given."""
+        """The operators of all measurements, or of those that are not missing in the measurements given."""
         seen = np.ones((self.steps, self.m), bool) if self._measurements is None else np.isfinite(self._measurements)
         return self._operators(seen)
 
     def _operators(self, seen: np.ndarray) -> OperatorSet:
-        """The tree with the rows of H that are measured; the last one made is kept."""
+        """Return the operators of the tree with the measured rows of H; the last one built is cached."""
         key = seen.tobytes()
         if key not in self._trees:
             last = self.steps - 1
@@ -216,7 +215,7 @@ class StateSpace:
         return made
 
     def _given(self, y: Any) -> tuple[np.ndarray, np.ndarray, OperatorSet, np.ndarray]:
-        """y (N, m), which are measured, the operators, and what is measured less its mean, stacked."""
+        """Return y (N, m), a mask of the measured entries, the operators, and the measurements less their mean, stacked."""
         if y is None and self._measurements is None:
             raise _core.ModelError("no measurements: give them here or to kalman(...)")
         series = self._measurements if y is None else self._series(y)
@@ -228,22 +227,22 @@ class StateSpace:
         return series, seen, soa, series[::-1][seen[::-1]] - soa.H @ (soa.phi @ self._prior())
 
     def _prior(self) -> np.ndarray:
-        """x0 at the tip."""
+        """Return x0 at the tip, stacked."""
         made = np.zeros(self.steps * self.n)
         made[-self.n :] = self.x0
         return made
 
     def _states(self, stacked: np.ndarray) -> np.ndarray:
-        """A stacked vector of F or V as (N, n), forward in time."""
+        """Return a stacked vector of F or V as (N, n), forward in time."""
         return stacked.reshape(self.steps, self.n)[::-1].copy()
 
     def _blocks(self, operator: _core.Operator) -> np.ndarray:
-        """Diagonal blocks of an operator of states, (N, n, n), forward in time: it is applied to n vectors. O(N)."""
+        """Return the diagonal blocks of an operator of states, (N, n, n), forward in time: it is applied to n vectors. O(N)."""
         made = (operator @ np.tile(np.eye(self.n), (self.steps, 1))).reshape(self.steps, self.n, self.n)[::-1]
         return symmetric(made)
 
     def _measured(self, stacked: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """A stacked vector of Θ as (N, m, ...), forward in time; NaN where nothing was measured."""
+        """Return a stacked vector of Θ as (N, m, ...), forward in time; NaN for missing measurements."""
         made = np.full((*seen.shape, *stacked.shape[1:]), np.nan)
         backward = made[::-1]
         backward[seen[::-1]] = stacked
@@ -252,7 +251,7 @@ class StateSpace:
     # ------------------------------------------------------------------ filter, smoother, likelihood
     @_naming_the_step
     def filter(self, y: Any = None) -> Filtered:
-        """Predicted and filtered states with covariances, innovations, gains, and the log-likelihood. O(N).
+        """Return predicted and filtered states with covariances, innovations, gains, and the log-likelihood. O(N).
 
         z = ψ(K(y - mean)) + mean, filtered: z + Gε.  Raises SingularHingeError, naming the step, where the innovation's covariance
         D = CPC* + R is singular.
@@ -281,10 +280,10 @@ class StateSpace:
 
     @_naming_the_step
     def smooth(self, y: Any = None) -> Smoothed:
-        """States of all steps given all measurements (fixed interval), with covariances. O(N).
+        """Return the states of all steps given all measurements (fixed interval), with covariances. O(N).
 
-        x = z + Pλ, λ = ψ*H*D⁻¹ε, covariance P - PΥP: the form of Bryson and Frazier, equal to that of Rauch, Tung and Striebel. As one
-        formula x = φMφ*H*(ℳ + J)⁻¹y, the covariance the diagonal blocks of φ(M - MΩM)φ*. Raises as `filter`.
+        x = z + Pλ, λ = ψ*H*D⁻¹ε, covariance P - PΥP: the form of Bryson and Frazier, equal to the form of Rauch, Tung and Striebel. As one
+        formula x = φMφ*H*(ℳ + J)⁻¹y; the covariance is the diagonal blocks of φ(M - MΩM)φ*. Raises as `filter`.
         """
         _, _, soa, e = self._given(y)
         H, phi, M, psi, K, D, P, Upsilon, I = soa("H phi M psi K D P Upsilon I")
@@ -298,7 +297,7 @@ class StateSpace:
 
     @_naming_the_step
     def log_likelihood(self, y: Any = None) -> float:
-        """ln p(y) = -½(ε*D⁻¹ε + ln det(ℳ + J) + ln(2π) times how many were measured). O(N). Raises as `filter`."""
+        """Return ln p(y) = -½(ε*D⁻¹ε + ln det(ℳ + J) + ln(2π) times the number of measurements). O(N). Raises as `filter`."""
         _, _, soa, e = self._given(y)
         return self._likelihood(soa, (soa.I - soa.H @ soa.psi @ soa.K) @ e)
 
@@ -322,28 +321,28 @@ class StateSpace:
         return phi @ (M - M @ Omega @ M) @ phi.T
 
     def play(self, y: Any = None, model: Any = None, tau: Any = None) -> Any:
-        """The dictionary running: filter and smoother over time beside forward dynamics of a chain, by one recursion, step by step. O(N).
+        """Run the dictionary: filter and smoother over time beside forward dynamics of a chain, by one recursion, step by step. O(N).
 
         Parameters
         ----------
-        y : (N, m) measurements, those given to `kalman` where left out; NaN where one is missing
-        model : Multibody, a serial chain of N bodies; equal rods in a plane, on pins with rotors, where left out
-        tau : (nv,) of its hinges, N m and N; ones where left out
+        y : (N, m) measurements, default: those given to `kalman`; NaN where one is missing
+        model : Multibody, a serial chain of N bodies; default: equal rods in a plane, on pins with rotors
+        tau : (nv,) of its hinges, N m and N; default: ones
 
         Returns
         -------
         KalmanPage
-            A notebook shows it; `save("kalman.html")` writes a page that opens offline. Of several measurements a step it draws the one
-            that is chosen in it; the recursion takes all.
+            A notebook shows it; `save("kalman.html")` writes a page that opens offline. Of several measurements per step the page draws the
+            one selected; the recursion uses all.
 
         Raises
         ------
         EvaluationError
             More than 60 steps.
         ModelError
-            Measurements that are needed; a model that is no chain of N bodies.
+            Missing measurements; a model that is not a chain of N bodies.
         SingularHingeError
-            A D that is singular, as in `filter`.
+            A singular D, as in `filter`.
 
         Examples
         --------
@@ -354,7 +353,7 @@ class StateSpace:
         return _core._face["play_smoother"](self, y, model, tau)
 
     def sample(self, seed: int | np.random.Generator = 0) -> tuple[np.ndarray, np.ndarray]:
-        """States (N, n) and measurements (N, m) drawn from the model: x = φ(noises + x0), y = Hx + v. O(N)."""
+        """Draw states (N, n) and measurements (N, m) from the model: x = φ(noises + x0), y = Hx + v. O(N)."""
         rng = np.random.default_rng(seed)
         noise = np.einsum("tij,tj->ti", roots(self._M), rng.normal(size=(self.steps, self.n)))
         soa = self._operators(np.ones((self.steps, self.m), bool))

@@ -1,4 +1,4 @@
-"""Inverse kinematics: configurations at which frames are where targets want them (docs/inverse_kinematics.md)."""
+"""Inverse kinematics: configurations that bring frames to targets (docs/inverse_kinematics.md)."""
 
 from .inverse_kinematics import solve_ik
 from .solution import Solution

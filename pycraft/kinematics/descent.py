@@ -1,15 +1,15 @@
 """Least squares of residuals on the group of configurations, within bounds, for many members at once.
 
-Of every member ½|w r(q)|² is made small over q = q₀ exp(d), lower ≤ q ≤ upper, from a start of its own. With J = w ∂r/∂v and μ = λ |w r|²,
+For every member ½|w r(q)|² is minimized over q = q₀ exp(d), lower ≤ q ≤ upper, from its own start. With J = w ∂r/∂v and μ = λ |w r|²,
 
-    d = argmin |w r + J d|² + μ |d|²    with q + d within bounds: coordinates that leave them are held there, and the rest solved again
+    d = argmin |w r + J d|² + μ |d|²    with q + d within bounds: coordinates that leave them are held there, and the others solved again
 
-so that near a solution μ falls with the square of its distance and convergence is quadratic, whether or not J has full rank. λ falls
-where the model of the residual was good and grows where it was not. Where r does not go to zero J*J is not all of its curvature: Newton's
-steps, d = -(|H| + μ)⁻¹ g with g = J* w r and H = ∂g/∂v by differences of the exact g, come to such a minimum in a few.
+so that near a solution μ falls with the square of the distance and convergence is quadratic, whether or not J has full rank. λ falls where
+the model of the residual was good and grows where it was not. If r does not go to zero, J*J is not all of its curvature: Newton's steps, d
+= -(|H| + μ)⁻¹ g with g = J* w r and H = ∂g/∂v by differences of the exact g, reach such a minimum in a few steps.
 
-A member ends where its targets are reached, or where it is stationary: no coordinate that may move makes an angle with r whose cosine,
-|J_i·w r| / (|J_i| |w r|), is above a bound.
+A member ends when its targets are reached, or when it is stationary: no coordinate that may move makes an angle with r with a cosine,
+|J_i·w r| / (|J_i| |w r|), above a bound.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from ..models.limits import CoordinateLimits
 from .target_rows import Rows
 
 FIRST, LEAST, MOST = 1e-2, 1e-8, 1e12
-"""λ: at first, at least, and where no step is any good."""
+"""λ: initial, least, and the value at which no step is any good."""
 ROUNDING = 32 * np.finfo(float).eps
-"""Of |w r|²: below it a step's gain cannot be told from its rounding, and the step is believed."""
+"""Relative to |w r|²: below it the gain of a step is lost in rounding, and the step is accepted."""
 
 
 @dataclass(frozen=True)
@@ -40,39 +40,40 @@ class Problem:
     limits: CoordinateLimits
 
     def evaluate(self, q: np.ndarray, of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r (B, m) and J = w ∂r/∂v (B, m, nv), zero for what may not move, at q (B, nq) with the targets of the members `of` (B,)."""
+        """Return r (B, m) and J = w ∂r/∂v (B, m, nv), zero for fixed coordinates, at q (B, nq) with the targets of the members `of`
+        (B,)."""
         residuals, rates = zip(*(rows.evaluate(q, of) for rows in self.rows), strict=True)
         return np.concatenate(residuals, axis=-1), self.weights[:, None] * np.concatenate(rates, axis=-2) * self.movable
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """(m,)"""
+        """Weights (m,) of the rows."""
         return np.concatenate([rows.weights for rows in self.rows])
 
     @property
     def names(self) -> list[str]:
-        """(m,)"""
+        """Names (m,) of the rows."""
         return [name for rows in self.rows for name in rows.names]
 
     def errors(self, r: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of every target the norms (B,) of its angles and lengths."""
+        """Return the norms (B,) of the angles and lengths of every target."""
         ends = np.cumsum([0, *(len(rows.names) for rows in self.rows)])
         return [rows.errors(r[:, first:last]) for rows, first, last in zip(self.rows, ends, ends[1:], strict=False)]
 
     def reached(self, r: np.ndarray) -> np.ndarray:
-        """Whether (B,) every target is within its tolerance."""
+        """Return whether (B,) every target is within its tolerance."""
         within = np.ones(len(r), bool)
         for rows, (angle, length) in zip(self.rows, self.errors(r), strict=True):
             within &= (angle <= rows.tolerance[0]) & (length <= rows.tolerance[1])
         return within
 
     def bounds(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far (B, nv) coordinates may move down and up."""
+        """Return how far (B, nv) coordinates may move down and up."""
         value = np.where(self.limits.q_index >= 0, q[:, self.limits.q_index], 0.0)
         return self.limits.lower - value, self.limits.upper - value
 
     def moved(self, q: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """q exp(d), within bounds, and on them exactly where rounding left it just inside."""
+        """Return q exp(d), within bounds, and exactly on a bound where rounding left it just inside."""
         out = np.array([self.model.integrate(*one) for one in zip(q, d, strict=True)]).reshape(q.shape)
         for bound, past in ((self.limits.lower, np.less_equal), (self.limits.upper, np.greater_equal)):
             some = np.isfinite(bound)
@@ -84,7 +85,7 @@ class Problem:
 
 @dataclass
 class Descents:
-    """Where descents ended: q (B, nq), r (B, m), whether their targets are reached, how stationary they are, and after how many steps."""
+    """Ends of descents: q (B, nq), r (B, m), whether their targets are reached, how stationary they are, and the number of steps."""
 
     q: np.ndarray
     r: np.ndarray
@@ -93,17 +94,17 @@ class Descents:
     iterations: np.ndarray
 
     def of(self, members: Any) -> Descents:
-        """These members, by numbers or a slice."""
+        """Return these members, by numbers or a slice."""
         return Descents(self.q[members], self.r[members], self.reached[members], self.slope[members], self.iterations[members])
 
     def take(self, into: np.ndarray, other: Descents) -> None:
-        """Have the members of `other` in the places `into`."""
+        """Copy the members of `other` to the places `into`."""
         for name in ("q", "r", "reached", "slope"):
             getattr(self, name)[into] = getattr(other, name)
 
 
 def descend(problem: Problem, q: np.ndarray, of: np.ndarray, iterations: int, stationary: float, newton: bool = False) -> Descents:
-    """From the starts q (B, nq), for the targets of the members `of` (B,), until reached or stationary, at most so many steps each."""
+    """Descend from the starts q (B, nq), for the targets of the members `of` (B,), until reached or stationary, or the step limit."""
     weights = problem.weights
     r, J = problem.evaluate(q, of)
     done = Descents(np.array(q), r, problem.reached(r), np.zeros(len(q)), np.zeros(len(q), int))
@@ -137,7 +138,8 @@ def descend(problem: Problem, q: np.ndarray, of: np.ndarray, iterations: int, st
 
 
 def _free(J: np.ndarray, e: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which coordinates (B, nv) move anything and are kept by no bound from going where e falls; the largest cosine (B,) of one and e."""
+    """Return which coordinates (B, nv) move anything and are free of bounds in the direction in which e falls; and the largest cosine
+    (B,)."""
     gradient = np.einsum("bij,bi->bj", J, e)
     size = np.linalg.norm(J, axis=-2) * np.linalg.norm(e, axis=-1)[:, None]
     free = (size > 0) & ~(((low >= 0) & (gradient > 0)) | ((high <= 0) & (gradient < 0)))
@@ -146,7 +148,7 @@ def _free(J: np.ndarray, e: np.ndarray, low: np.ndarray, high: np.ndarray) -> tu
 
 
 def _hessian(problem: Problem, q: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """∂g/∂v (B, nv, nv), symmetric, by central differences of g = J* w r, whose own error is near 10⁻¹⁰ of it."""
+    """Return ∂g/∂v (B, nv, nv), symmetric, by central differences of g = J* w r, with a relative error near 10⁻¹⁰ from g itself."""
     n, h = len(problem.movable), 1e-5
     H = np.zeros((len(q), n, n))
     chosen = np.flatnonzero(problem.movable)
@@ -157,7 +159,7 @@ def _hessian(problem: Problem, q: np.ndarray, of: np.ndarray) -> np.ndarray:
 
 
 def _gradient(problem: Problem, q: np.ndarray, of: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """g (B, k, nv) of every member moved along every way (k, nv), past its bounds where it is at one."""
+    """Return g (B, k, nv) of every member moved along every direction (k, nv), past its bounds where it is at one."""
     moved = np.array([problem.model.integrate(one, way) for one in q for way in ways]).reshape(-1, q.shape[1])
     r, J = problem.evaluate(moved, np.repeat(of, len(ways)))
     return np.einsum("bij,bi->bj", J, problem.weights * r).reshape(len(q), len(ways), -1)
@@ -166,7 +168,7 @@ def _gradient(problem: Problem, q: np.ndarray, of: np.ndarray, ways: np.ndarray)
 def _step(
     J: np.ndarray, e: np.ndarray, mu: np.ndarray, low: np.ndarray, high: np.ndarray, free: np.ndarray, H: np.ndarray | None = None
 ) -> np.ndarray:
-    """The damped step d (B, nv) within bounds; what leaves them is held at them, and the rest solved again, while anything leaves."""
+    """Return the damped step d (B, nv) within bounds; coordinates that leave them are held there, and the others solved again."""
     free, d = np.array(free), np.zeros(low.shape)
     open_ = np.arange(len(d))
     for _ in range(low.shape[-1]):
@@ -188,13 +190,13 @@ def _step(
 
 
 def _newton(H: np.ndarray, g: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """-(|H| + μ)⁻¹ g (B, nv)."""
+    """Return -(|H| + μ)⁻¹ g (B, nv)."""
     values, vectors = np.linalg.eigh(H)
     return -np.einsum("bij,bj->bi", vectors, np.einsum("bji,bj->bi", vectors, g) / (np.abs(values) + mu[:, None]))
 
 
 def _damped(J: np.ndarray, e: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """argmin |e + J d|² + μ|d|², (B, nv), by singular values; those that are rounding count as zero."""
+    """Return argmin |e + J d|² + μ|d|², (B, nv), by singular values; those at the level of rounding count as zero."""
     U, s, Vt = np.linalg.svd(J, full_matrices=False)
     rounding = max(J.shape[-2], J.shape[-1]) * np.finfo(float).eps * s.max(axis=-1, initial=0.0)[:, None]
     kept = s > rounding

@@ -1,4 +1,4 @@
-"""Targets as users give them, checked and made rows: see `solve_ik`."""
+"""Check targets of users and turn them into rows: see `solve_ik`."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ KEYS = (*WHAT, "along", "wrt", "directions", "axes", "weight", "tolerance")
 MASS_CENTRE_KEYS = ("position", "wrt", "directions", "weight", "tolerance")
 MASS_CENTRE = "centre of mass"
 LARGEST, WEIGHTS = 1e100, (1e-30, 1e30)
-"""Of numbers in targets, and of weights: the square of their product, times the largest damping, is still a double."""
+"""Bounds of values in targets, and of weights: the square of their product, times the largest damping, is still a double."""
 SHAPES = {"pose": (4, 4), "orientation": (3, 3), "position": (3,), "along": (3,), "axis": (3,)}
 DIGITS = 1e-6
-"""How far from orthogonal the rotation of a target may be: six digits, as of the poses of a model."""
+"""Largest deviation of a target's rotation from orthogonality: six digits, as for the poses of a model."""
 
 
 def rows_of(model: Any, targets: Any, centre_of_mass: Any, tolerance: Any) -> tuple[list[Rows], int | None]:
-    """The rows of all targets, and of how many states there are targets, None where each is one for all.
+    """Return the rows of all targets, and the number of states for which there are targets, None if each is one for all.
 
-    ModelError names the frame, what is wrong, and what there is.
+    ModelError names the frame, the fault, and the choices.
     """
     overall = _tolerance(tolerance, "tolerance")
     rows: list[Rows] = []
@@ -54,7 +54,7 @@ def rows_of(model: Any, targets: Any, centre_of_mass: Any, tolerance: Any) -> tu
 
 
 def _loop_rows(model: Any, overall: tuple[float, float]) -> list[Rows]:
-    """Every loop's rows of positions: a configuration with the loops open is none of the model's.
+    """Return every loop's rows of positions: a configuration with open loops is not one of the model.
 
     Angles are rows about axes, and couplings of angles alone.
     """
@@ -74,7 +74,7 @@ def _loop_rows(model: Any, overall: tuple[float, float]) -> list[Rows]:
 
 
 def _counts(given: dict[str, Any], name: str) -> dict[str, int]:
-    """Sizes of the batches among the values of a target, which are checked."""
+    """Return the sizes of the batches among the values of a target, which are checked."""
     shapes = {key: np.shape(given[key]) for key in SHAPES if key in given}
     return {f"{key} of {name!r}": shape[0] for key, shape in shapes.items() if len(shape) > len(SHAPES[key])}
 
@@ -92,7 +92,7 @@ def _pairs(targets: Any) -> list[tuple[Any, Any]]:
 
 
 def _keys(given: Any, what: str, known: tuple[str, ...]) -> dict[str, Any]:
-    """A target as a dictionary; an array is a pose, an orientation or a position, by its shape."""
+    """Return a target as a dictionary; an array is a pose, an orientation or a position, by its shape."""
     if isinstance(given, Mapping):
         for key in given:
             if key not in known:
@@ -101,7 +101,7 @@ def _keys(given: Any, what: str, known: tuple[str, ...]) -> dict[str, Any]:
                 raise _core.ModelError(f"the {what} has no {key!r}; {said}")
         return dict(given)
     array = _core.real_array(given, what)
-    for key in ("pose", "orientation", "position"):  # three positions (3, 3) are one orientation, unless their key says otherwise
+    for key in ("pose", "orientation", "position"):  # three positions (3, 3) are one orientation, unless their key differs
         shape = SHAPES[key]
         if key in known and array.shape[-len(shape) :] == shape and array.ndim <= len(shape) + 1:
             return {key: array}
@@ -110,7 +110,7 @@ def _keys(given: Any, what: str, known: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _values(given: dict[str, Any], key: str, what: str) -> np.ndarray:
-    """(T, ...) of the key's shape, T = 1 for all members."""
+    """Return values (T, ...) of the key's shape, T = 1 for all members."""
     shape, array = SHAPES[key], np.array(_core.real_array(given[key], f"{key} of the {what}"), float)
     if array.shape[-len(shape) :] != shape or array.ndim > len(shape) + 1:
         raise _core.ModelError(f"{key} of the {what} takes shape {shape}, with a leading axis for a batch, not {array.shape}")
@@ -123,7 +123,7 @@ def _values(given: dict[str, Any], key: str, what: str) -> np.ndarray:
 
 
 def _rotations(R: np.ndarray, what: str) -> np.ndarray:
-    """The nearest rotations to these matrices. ModelError where one is none to six digits."""
+    """Return the nearest rotations to these matrices. ModelError for a matrix that is not a rotation to six digits."""
     off = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
     wrong = np.flatnonzero((off > DIGITS) | (np.linalg.det(R) < 0))
     if len(wrong):
@@ -143,7 +143,7 @@ def _tolerance(given: Any, what: str) -> tuple[float, float]:
 
 
 def _weights(given: dict[str, Any], angular: np.ndarray, what: str) -> np.ndarray:
-    """Of every row, 1/rad or 1/m."""
+    """Return the weights of every row, 1/rad or 1/m."""
     pair = np.atleast_1d(_core.real_array(given.get("weight", 1.0), f"weight of the {what}")).tolist()
     if len(pair) not in (1, 2) or not all(x > 0 and np.isfinite(x) for x in pair):
         raise _core.ModelError(f"weight of the {what}: a positive number, or a pair (1/rad, 1/m), not {given['weight']!r}")

@@ -1,4 +1,4 @@
-"""Inverse kinematics from a start, from random ones where that is needed, and what came of it: `Multibody.solve_ik`."""
+"""Inverse kinematics from a start, then from random ones if needed, and its result: `Multibody.solve_ik`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .posture import approach
 from .solution import Solution
 
 SEARCH, STATIONARY = 1e-4, 1e-7
-"""Cosines at which a descent is given up for another one, and at which a configuration is a local minimum: what is left is then the least
+"""Cosines at which a descent is given up for another one, and at which a configuration is a local minimum: then the residual is the least
 along any coordinate to 10⁻¹⁴ of itself."""
 TOGETHER = 4096
-"""Members of a descent, so that memory does not go with the number of restarts."""
+"""Members of a descent, so that memory does not grow with the number of restarts."""
 
 
 def solve_ik(
@@ -56,7 +56,7 @@ def solve_ik(
 
 
 def _movable(model: Any, coordinates: Any) -> np.ndarray:
-    """Which coordinates (nv,) may move. ModelError for part of a subhinge of several."""
+    """Return which coordinates (nv,) may move. ModelError for part of a subhinge of several."""
     chosen = coordinate_numbers(model, coordinates)
     movable = np.ones(model.nv, bool)
     if chosen is not None:
@@ -64,22 +64,22 @@ def _movable(model: Any, coordinates: Any) -> np.ndarray:
         movable[chosen] = True
     for one in subhinges(model):
         if movable[one.v].any() and not movable[one.v].all():
-            text = f"coordinates: part of the {one.kind} subhinge of hinge {one.hinge!r}, which moves whole or not; name the hinge, or none"
+            text = f"coordinates: part of the {one.kind} subhinge of hinge {one.hinge!r}, which moves as a whole; name the hinge"
             raise _core.ModelError(text)
     return movable
 
 
 def _bounds(model: Any, movable: np.ndarray, limits: bool) -> CoordinateLimits:
-    """Limits of what may move; what may not stays where it is, inside or outside."""
+    """Return the limits of movable coordinates; the others stay where they are, inside or outside."""
     known = coordinate_limits(model)
     bounded = movable & limits
     return CoordinateLimits(np.where(bounded, known.lower, -np.inf), np.where(bounded, known.upper, np.inf), known.q_index)
 
 
 def _searched(problem: Problem, start: np.ndarray, iterations: int, restarts: int, rng: Any) -> tuple[Descents, np.ndarray]:
-    """The best of all descents of every member, and of how many. Rounds double, so that few are in vain and many go together.
+    """Return the best of all descents of every member, and their number. Rounds double, so that few are in vain and many run together.
 
-    Every member takes the same random starts in the same order: what a batch finds for it is what it finds alone.
+    Every member takes the same random starts in the same order: a batch finds for it what it finds alone.
     """
     count = len(start)
     best, begun = descend(problem, start, np.arange(count), iterations, SEARCH), np.ones(count, int)
@@ -106,7 +106,7 @@ def _searched(problem: Problem, start: np.ndarray, iterations: int, restarts: in
 
 
 def _take_better(problem: Problem, best: Descents, some: np.ndarray, found: Descents) -> None:
-    """Of each member's several descents that with the least residual, where that is less than what there was."""
+    """Take for each member the descent with the least residual, if it is less than before."""
     residuals = np.sum((problem.weights * found.r) ** 2, axis=-1).reshape(len(some), -1)
     rank = np.where(found.reached.reshape(residuals.shape), -1.0, residuals)
     first = np.arange(len(some)) * rank.shape[1] + rank.argmin(axis=-1)

@@ -1,8 +1,8 @@
-"""Among configurations that reach their targets one that is near to a posture: descent of |δ|² in the null space, with restoration.
+"""Find a configuration near a posture among those that reach their targets: descent of |δ|² in the null space, with restoration.
 
-δ = `difference(q, posture)` is the way to the posture, and falls as (1 - t) δ along itself. Of it is taken N δ, N = 1 - J⁺J on the
-coordinates that no limit holds, as far as limits allow; the step is restored by Gauss-Newton steps for the targets, and halved until |δ|²
-has fallen. It ends where N δ is nothing: a local minimum of |δ| among the configurations that reach the targets.
+δ = `difference(q, posture)` is the displacement to the posture, and falls as (1 - t) δ along itself. The step is N δ, N = 1 - J⁺J on the
+coordinates that no limit holds, as far as limits allow; it is restored by Gauss-Newton steps for the targets, and halved until |δ|² has
+fallen. The descent ends where N δ vanishes: a local minimum of |δ| among the configurations that reach the targets.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from ..models.limits import subhinges
 from .descent import Descents, Problem, descend
 
 STILL = 1e-7
-"""|N δ| over 1 + |δ| at which a configuration is as near as it gets."""
+"""|N δ| over 1 + |δ| at which a configuration counts as nearest."""
 WEAK = 1e-9
-"""Singular values over the largest below which a motion is in the null space."""
+"""Relative to the largest singular value: a motion with a smaller one is in the null space."""
 
 
 def approach(problem: Problem, best: Descents, posture: np.ndarray, iterations: int) -> None:
-    """Moves what is reached in `best` towards the postures (B, nq)."""
+    """Move the members of `best` that reached their targets towards the postures (B, nq)."""
     counted = _counted(problem)
     live, step = np.flatnonzero(best.reached), np.ones(len(best.q))
     for _ in range(iterations):
@@ -42,7 +42,7 @@ def approach(problem: Problem, best: Descents, posture: np.ndarray, iterations: 
 
 
 def _counted(problem: Problem) -> np.ndarray:
-    """Which coordinates (nv,) a posture is of."""
+    """Return the coordinates (nv,) that a posture counts."""
     counted = np.array(problem.movable)
     for one in subhinges(problem.model):
         if one.kind == "free":
@@ -51,13 +51,13 @@ def _counted(problem: Problem) -> np.ndarray:
 
 
 def _way(problem: Problem, q: np.ndarray, posture: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """δ (B, nv)."""
+    """Return δ (B, nv)."""
     ways = [problem.model.difference(*one) for one in zip(q, posture, strict=True)]
     return np.array(ways).reshape(len(q), len(counted)) * counted
 
 
 def _along(problem: Problem, best: Descents, live: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """N δ (B, nv), zero where a limit holds what it would move, and the largest step (B,) along it, 1 at most, that limits allow."""
+    """Return N δ (B, nv), zero for coordinates held by a limit, and the largest step (B,) along it, 1 at most, within limits."""
     J = problem.evaluate(best.q[live], live)[1]
     low, high = problem.bounds(best.q[live])
     free = np.broadcast_to(problem.movable, way.shape)

@@ -1,4 +1,4 @@
-"""Rotation vectors: the logarithm of rotations, and how it changes with them."""
+"""Rotation vectors: the logarithm of rotations, and its rate."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 
 
 def rotation_vectors(R: np.ndarray) -> np.ndarray:
-    """φ (B, 3) with exp(φ~) = R (B, 3, 3), |φ| ≤ π, rad."""
+    """Return φ (B, 3) with exp(φ~) = R (B, 3, 3), |φ| ≤ π, rad."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(R).as_rotvec() if len(R) else np.zeros((0, 3))
 
 
 def skew(x: np.ndarray) -> np.ndarray:
-    """x~ (..., 3, 3), x~y = x × y."""
+    """Return x~ (..., 3, 3), x~y = x × y."""
     out = np.zeros((*x.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = x[..., 2], -x[..., 1], x[..., 0]
@@ -21,12 +21,12 @@ def skew(x: np.ndarray) -> np.ndarray:
 
 
 def rates_of_rotation_vectors(phi: np.ndarray) -> np.ndarray:
-    """A(φ) (B, 3, 3) with φ̇ = A ω, ω the angular velocity in the axes that turn: the inverse of the right Jacobian.
+    """Return A(φ) (B, 3, 3) with φ̇ = A ω, ω the angular velocity in the axes that turn: the inverse of the right Jacobian.
 
         A(φ) = 1 + ½ φ~ + c(θ) φ~φ~,   c(θ) = (1 - (θ/2) cot(θ/2)) / θ²,   θ = |φ|
 
-    c(0) = 1/12 and c(π) = 1/π²: it is smooth on the way from no turn to half of one. Below θ = 0.1 its series to θ⁶, which leaves less than
-    rounding out.
+    c(0) = 1/12 and c(π) = 1/π²: it is smooth from no turn to half a turn. Below θ = 0.1 its series to θ⁶, with a truncation error below
+    rounding.
 
     Source: G. Chirikjian, Stochastic Models, Information Theory, and Lie Groups, vol. 2, Birkhäuser 2012.
     """

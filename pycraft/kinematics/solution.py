@@ -1,4 +1,4 @@
-"""What inverse kinematics found, and what stands in the way where a target was not reached."""
+"""Results of inverse kinematics, with the reason where a target was not reached."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..dynamics.task_space import told
 from .descent import Descents, Problem
 
 WEAK = 1e-6
-"""Of singular values over the largest: what counts as a motion that is lost."""
+"""Relative to the largest singular value: smaller ones count as a lost motion."""
 
 
 class Solution(Closed):
-    """A configuration that inverse kinematics found, or one for every state of a batch (`len`, `solution[b]`).
+    """A configuration found by inverse kinematics, or one for every state of a batch (`len`, `solution[b]`).
 
-    Everything has a leading axis, or is a list, for a batch.
+    For a batch every value has a leading axis, or is a list.
     """
 
     def __init__(self, problem: Problem, ended: Descents, of: np.ndarray, descents: np.ndarray, stationary: float, batch: bool):
@@ -31,17 +31,17 @@ class Solution(Closed):
 
     @property
     def q(self) -> np.ndarray:
-        """(nq,) or (B, nq): where the targets are reached, or nearest of what was found."""
+        """(nq,) or (B, nq): the configuration that reaches the targets, or the nearest one found."""
         return self._shown(self._q)
 
     @property
     def reached(self) -> Any:
-        """Whether every target is within its tolerance."""
+        """True if every target is within its tolerance."""
         return self._shown(self._ended.reached)
 
     @property
     def errors(self) -> dict[str, tuple[Any, Any]]:
-        """By target what is left, (rad, m), along its directions; of a frame with several targets under "hand", "hand (2)", ..."""
+        """Remaining errors by target, (rad, m), along its directions; several targets of a frame are "hand", "hand (2)", ..."""
         found: dict[str, tuple[Any, Any]] = {}
         for rows, (angle, length) in zip(self._problem.rows, self._problem.errors(self._r), strict=True):
             count = sum(other.name == rows.name for other in self._problem.rows[: len(found)])
@@ -55,12 +55,12 @@ class Solution(Closed):
 
     @property
     def descents(self) -> Any:
-        """From how many configurations was begun: 1 where q0 led there."""
+        """Number of starting configurations: 1 if q0 led to a solution."""
         return self._shown(self._descents)
 
     @property
     def stationarity(self) -> Any:
-        """The largest cosine between what is left and a coordinate's effect, bounds heeded: zero at a local minimum. 0 where reached."""
+        """The largest cosine between the residual and a coordinate's effect, within bounds: zero at a local minimum. 0 where reached."""
         return self._shown(np.where(self._ended.reached, 0.0, self._slope))
 
     @property
@@ -70,17 +70,17 @@ class Solution(Closed):
 
     @property
     def missed(self) -> list:
-        """By direction what is left (rad, m) of targets that are not reached: a dictionary."""
+        """Remaining errors by direction (rad, m) of targets that are not reached: a dictionary."""
         return self._each(self._missed_of)
 
     @property
     def lost(self) -> list:
-        """Combinations of directions along which nothing can move that is not held by a limit, as `TaskSpace.lost` has them."""
+        """Combinations of directions along which no coordinate that is free of limits can move, as `TaskSpace.lost` gives them."""
         return self._each(self._lost_of)
 
     @property
     def why(self) -> Any:
-        """In words why a target was not reached; empty where all are."""
+        """The reason in words why a target was not reached; empty if all are."""
         return self._each(self._why_of)
 
     def _each(self, of: Any) -> Any:
@@ -102,7 +102,7 @@ class Solution(Closed):
         return found
 
     def _pressed_of(self, b: int) -> tuple[np.ndarray, np.ndarray]:
-        """The weighted Jacobian (m, nv), and which coordinates (nv,) a limit holds against what is left."""
+        """Return the weighted Jacobian (m, nv), and which coordinates (nv,) a limit holds against the residual."""
         problem, e = self._problem, self._problem.weights * self._r[b]
         J = problem.evaluate(self._q[b : b + 1], self._of[b : b + 1])[1][0]
         gradient = J.T @ e
@@ -117,7 +117,7 @@ class Solution(Closed):
         names = self._problem.names
         found = []
         for column in U[:, weak].T:
-            shares = column * self._problem.weights  # a covector: what does not move is this sum of directions
+            shares = column * self._problem.weights  # a covector: this sum of directions does not move
             shares = shares / shares[np.abs(shares).argmax()]
             found.append({names[i]: float(shares[i]) for i in np.argsort(-np.abs(shares), kind="stable") if abs(shares[i]) >= 0.05})
         return found
@@ -137,7 +137,7 @@ class Solution(Closed):
     def _reason(self, b: int) -> str:
         pressed = self._pressed_of(b)[1]
         if self._slope[b] > self._stationary:
-            return f"not stationary yet (cosine {self._slope[b]:.1e}); allow more iterations"
+            return f"not yet stationary (cosine {self._slope[b]:.1e}); allow more iterations"
         if pressed.any():
             names, sides = self._problem.model.coordinate_names, dict(self._at_limits_of(b))
             return f"at limits are {', '.join(f'{names[i]} ({sides[names[i]]})' for i in np.flatnonzero(pressed))}"
@@ -148,15 +148,15 @@ class Solution(Closed):
         return f"no motion lessens it along {told([dict(sorted(direction.items(), key=lambda one: -abs(one[1])))])}"
 
     def __bool__(self) -> bool:
-        """Whether it is reached: `if arm.solve_ik(...):`. ModelError for a batch, whose members may differ."""
+        """Check that it is reached: `if arm.solve_ik(...):`. ModelError for a batch, since its members may differ."""
         if self._batch:
-            raise _core.ModelError(f"a batch of {len(self._q)} is neither reached nor not: take .reached.all() or .reached.any()")
+            raise _core.ModelError(f"a batch of {len(self._q)} is neither reached nor not: use .reached.all() or .reached.any()")
         return bool(self.reached)
 
     # ------------------------------------------------------------------ a batch
     def __len__(self) -> int:
         if not self._batch:
-            raise _core.ModelError("the solution of one state has no length; that of a batch has")
+            raise _core.ModelError("the solution of one state has no length; the solution of a batch has")
         return len(self._q)
 
     def __getitem__(self, b: int) -> Solution:

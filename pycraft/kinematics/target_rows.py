@@ -1,6 +1,6 @@
-"""What a target asks of a configuration, as residuals r(q) with their exact Jacobians ∂r/∂v.
+"""Targets as residuals r(q) of a configuration with their exact Jacobians ∂r/∂v.
 
-In the axes of the frame that a target is seen from, R and p the frame's rotation and position there, (ω; v) its velocity in its own axes:
+In the axes of the target's reference frame, R and p the frame's rotation and position there, (ω; v) its velocity in its own axes:
 
     rotation   x = R_t φ,  φ = log(R_t* R)          ẋ = R_t A(φ) ω           A: `rates_of_rotation_vectors`
     position   x = p - p_t                          ẋ = R v
@@ -27,10 +27,10 @@ Evaluated = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Rows:
-    """Residuals of one target. `angular`: which of its rows are angles (rad); the others are lengths (m).
+    """Residuals of one target. `angular`: marks the rows that are angles (rad); the others are lengths (m).
 
-    tolerance : (rad, m) below which the target counts as reached, by the norms of either
-    weights : (m,) of the rows in what is made small, 1/rad and 1/m
+    tolerance : (rad, m) below which the target counts as reached, by the norms of angles and lengths
+    weights : (m,) of the rows in the objective, 1/rad and 1/m
     """
 
     name: str
@@ -40,22 +40,22 @@ class Rows:
     weights: np.ndarray
 
     def evaluate(self, q: np.ndarray, of: np.ndarray) -> Evaluated:
-        """At the states q (B, nq), the targets of the members `of` (B,)."""
+        """Evaluate at the states q (B, nq), for the targets of the members `of` (B,)."""
         raise NotImplementedError
 
     def errors(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Norms (B,) of the angles and of the lengths among residuals (B, m)."""
+        """Return the norms (B,) of the angles and of the lengths among residuals (B, m)."""
         return np.linalg.norm(r[:, self.angular], axis=-1), np.linalg.norm(r[:, ~self.angular], axis=-1)
 
 
 def member(values: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """The values of members, where there is one for all."""
+    """Return the values of members; one value counts for all."""
     return values if len(values) == 1 else values[of]
 
 
 @dataclass(frozen=True)
 class PoseRows(Rows):
-    """A frame's rotation, position or both, as far as they are chosen; `axes`: None those of `wrt`, "target", or a frame."""
+    """A frame's rotation, position or both, or chosen components of these; `axes`: None for those of `wrt`, "target", or a frame."""
 
     frame: Any
     wrt: Any
@@ -83,7 +83,7 @@ class PoseRows(Rows):
         return np.concatenate(residuals, axis=-1), np.concatenate(rates, axis=-2)
 
     def _turned(self, q: np.ndarray, target: np.ndarray | None) -> Callable[[np.ndarray, np.ndarray, list[int]], Evaluated]:
-        """Of vectors x in the axes of `wrt` and their rates: the chosen components of both in the axes C of the target."""
+        """Return the chosen components of vectors x in the axes of `wrt` and of their rates, both in the axes C of the target."""
         if self.axes is None:
             return lambda x, dx, chosen: (x[:, chosen], dx[:, chosen])
         if isinstance(self.axes, str):
@@ -97,7 +97,7 @@ class PoseRows(Rows):
 
 @dataclass(frozen=True)
 class PointingRows(Rows):
-    """An axis a of a frame along a direction b of `wrt`, whatever the turn about it; `across` (T, 2, 3): E."""
+    """An axis a of a frame along a direction b of `wrt`, for any rotation about it; `across` (T, 2, 3): E."""
 
     frame: Any
     wrt: Any
@@ -111,7 +111,7 @@ class PointingRows(Rows):
         u = R @ self.axis
         y, cosine = np.einsum("bij,bj->bi", E, u), np.sum(b * u, axis=-1)
         sine = np.linalg.norm(y, axis=-1)
-        opposite = (sine < 1e-8) & (cosine < 0)  # every way round is as short; the first is taken, from just beside
+        opposite = (sine < 1e-8) & (cosine < 0)  # all ways round are equally short; take the first, from just beside
         y = np.where(opposite[:, None], (1e-8, 0.0), y)
         u = np.where(opposite[:, None], np.einsum("bji,bj->bi", E, y) - b, u)
         sine = np.where(opposite, 1e-8, sine)
@@ -145,7 +145,7 @@ class MassCentreRows(Rows):
 
 @dataclass(frozen=True)
 class LoopRows(Rows):
-    """A loop of the model that is to be closed: those of its rows that are of positions, (k,) among all rows of the model's loops."""
+    """A loop of the model to be closed: its rows of positions, (k,) among all rows of the model's loops."""
 
     model: Any
     chosen: np.ndarray

@@ -12,27 +12,27 @@ from .. import _core
 from ..arguments import one_number, several
 
 METHODS = ("zoh", "foh", "bilinear", "euler", "backward_diff", "impulse")
-"""Ways to discretise, SciPy's."""
+"""Methods of discretization, SciPy's."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
     """δẋ = A δx + B δu, δy = C δx + D δu near a state of a model or scene; with `dt`, δx⁺ = A δx + B δu from step to step.
 
-    Of a batch of states all arrays have a leading axis, and an index gives the model at one of them.
+    For a batch of states all arrays have a leading axis, and an index returns the model at one state.
 
     Attributes
     ----------
     A, B, C, D : (n, n), (n, m), (p, n), (p, m)
-        The states are displacements along coordinates (on ball and free hinges in the axes that v has there), velocities, and what the
-        effects of a scene have of their own.
+        The states are displacements along coordinates (on ball and free hinges in the axes of v), velocities, and the effects' own states
+        of a scene.
     rate : (n,), ẋ at the state itself: zero at an equilibrium
-    states, inputs, outputs : names
-    units : of the states, by name
-    dt : s, None where time is continuous
-    model, q, v, t : where it was taken
-    tangent : (2 nv + ..., n), of a model on its loops, whose states are independent coordinates: what the tree's states are by these, to
-        first order; None where the states are all of them
+    states, inputs, outputs : their names
+    units : units of the states, by name
+    dt : s, None for continuous time
+    model, q, v, t : the state at which it was linearized
+    tangent : (2 nv + ..., n), for a model on its loops, with independent coordinates as states: the tree's states in terms of these, to
+        first order; None if the states are the tree's
     """
 
     A: np.ndarray
@@ -53,7 +53,7 @@ class LinearModel:
 
     @property
     def displacements(self) -> int:
-        """How many of the states are displacements: the first ones."""
+        """Number of states that are displacements; these come first."""
         return sum(name.startswith("q.") for name in self.states)
 
     def __bool__(self) -> bool:
@@ -89,7 +89,7 @@ class LinearModel:
 
     # ------------------------------------------------------------------ parts of it
     def place(self, names: Any, of: str = "states") -> list[int]:
-        """Where states, "inputs" or "outputs" of these names are. ModelError for one that is not there, with what there is."""
+        """Return the indices of states, "inputs" or "outputs" by name. ModelError for an unknown name lists the known ones."""
         if of not in ("states", "inputs", "outputs"):
             raise _core.ModelError(f"of={of!r:.80}: there are 'states', 'inputs' and 'outputs'")
         known = list(getattr(self, of))
@@ -100,7 +100,7 @@ class LinearModel:
         return [known.index(name) for name in wanted]
 
     def select(self, inputs: Any = None, outputs: Any = None) -> LinearModel:
-        """The same states with some of the inputs and outputs, in the order of their names; None: all."""
+        """Return the same model with some of the inputs and outputs, in the order of their names; None: all."""
         j = list(range(len(self.inputs))) if inputs is None else self.place(inputs, "inputs")
         i = list(range(len(self.outputs))) if outputs is None else self.place(outputs, "outputs")
         return replace(
@@ -109,14 +109,14 @@ class LinearModel:
         )  # fmt: skip
 
     def one(self, what: str) -> LinearModel:
-        """Itself; ModelError for a batch, whose members `what` takes one by one."""
+        """Return the model itself; ModelError for a batch, since `what` takes one state at a time."""
         if self.A.ndim != 2:
-            raise _core.ModelError(f"{what} is of one state; this is a batch of {len(self.A)}: take one by its index")
+            raise _core.ModelError(f"{what} takes one state; this is a batch of {len(self.A)}: select one by its index")
         return self
 
     # ------------------------------------------------------------------ in time
     def step_of(self, dt: Any, order: str) -> float:
-        """dt as a number of seconds. EvaluationError for one that is no step, and where this model of some order is discrete already."""
+        """Return dt in seconds. EvaluationError unless it is positive and finite, and if this model of some order is already discrete."""
         step = one_number(dt, "dt")
         if not 0 < step < np.inf:
             raise _core.EvaluationError(f"dt={step:g}: a step is a positive number of seconds")
@@ -125,7 +125,7 @@ class LinearModel:
         return step
 
     def discrete(self, dt: float, method: str = "zoh") -> LinearModel:
-        """From step to step of dt seconds: SciPy's `cont2discrete`.
+        """Return the discrete model with steps of dt seconds: SciPy's `cont2discrete`.
 
         Parameters
         ----------
@@ -136,8 +136,7 @@ class LinearModel:
         Raises
         ------
         EvaluationError
-            An unknown method, a step that is no positive number, or over which the model leaves the range of its numbers, a model that is
-            discrete already.
+            An unknown method, a step that is not a positive number or over which the model overflows, a model that is already discrete.
         """
         from scipy.signal import cont2discrete
 
@@ -155,35 +154,35 @@ class LinearModel:
             raise _core.EvaluationError(f"dt={step:g}: by {method!r} {self.model.name!r} leaves the range of its numbers over such a step")
         return replace(self, A=A, B=B, C=C, D=D, dt=step)
 
-    # ------------------------------------------------------------------ what it says
+    # ------------------------------------------------------------------ analysis
     def modes(self) -> Any:
-        """Its natural modes: `pycraft.linear.modes.Modes`, with frequencies, damping ratios and shapes."""
+        """Return its natural modes: `pycraft.linear.modes.Modes`, with frequencies, damping ratios and shapes."""
         from .modes import modes_of
 
         return modes_of(self.one("modes()"))
 
     def controllability(self, tolerance: float | None = None) -> Any:
-        """What its inputs reach: `pycraft.linear.reach.Reach`, with the directions that they do not, by name."""
+        """Return what its inputs reach: `pycraft.linear.reach.Reach`, with the uncontrollable directions by name."""
         from .reach import controllability_of
 
         return controllability_of(self.one("controllability()"), tolerance)
 
     def observability(self, tolerance: float | None = None) -> Any:
-        """What its outputs show: `pycraft.linear.reach.Reach`, with the directions that they do not, by name."""
+        """Return what its outputs show: `pycraft.linear.reach.Reach`, with the unobservable directions by name."""
         from .reach import observability_of
 
         return observability_of(self.one("observability()"), tolerance)
 
-    # ------------------------------------------------------------------ ways out
+    # ------------------------------------------------------------------ export
     def to_scipy(self) -> Any:
-        """`scipy.signal.StateSpace`."""
+        """Return a `scipy.signal.StateSpace`."""
         from scipy.signal import StateSpace
 
         one = self.one("to_scipy()")
         return StateSpace(one.A, one.B, one.C, one.D, **({} if one.dt is None else {"dt": one.dt}))
 
     def to_control(self) -> Any:
-        """`control.StateSpace` with the names, "q_elbow" for "q.elbow". ImportError where python-control is missing (extra [control])."""
+        """Return a `control.StateSpace` with the names, "q_elbow" for "q.elbow". ImportError without python-control (extra [control])."""
         try:
             import control
         except ImportError:
@@ -193,12 +192,12 @@ class LinearModel:
         return control.ss(one.A, one.B, one.C, one.D, 0 if one.dt is None else one.dt, **names)
 
     def to_numpy(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """(A, B, C, D)."""
+        """Return (A, B, C, D)."""
         return self.A, self.B, self.C, self.D
 
 
 def stacked(each: list[LinearModel], count: int | None = None) -> LinearModel:
-    """A batch of linear models of the same states, inputs and outputs; of the first `count`, 0: none, with the sizes of one."""
+    """Stack linear models with the same states, inputs and outputs to a batch of the first `count`; 0: empty, with the sizes of one."""
     first, each = each[0], each[:count]
     if not each:
         return _none_like(first)

@@ -13,15 +13,16 @@ from .linear_model import LinearModel
 
 
 class Modes(TidyTable):
-    """The modes of a linear model, slowest first: one row each, of a conjugate pair one row.
+    """The modes of a linear model, slowest first: one row per mode, one row per conjugate pair.
 
-    Each row is a dictionary: "eigenvalue" (1/s; of a discrete model that of the continuous one that it samples), "frequency" (Hz, of the
-    oscillation itself, |Im λ|/2π), "natural" (Hz, |λ|/2π), "damping" (ratio, -Re λ/|λ|; None for λ = 0), "stable" (Re λ < 0; None where
-    that is zero to rounding), "moves" (the coordinates that take part most, by name).
+    Each row is a dictionary: "eigenvalue" (1/s; for a discrete model, of the continuous model that it samples), "frequency" (Hz, of the
+    oscillation itself, |Im λ|/2π), "natural" (Hz, |λ|/2π), "damping" (ratio, -Re λ/|λ|; None for λ = 0), "stable" (Re λ < 0; None if Re λ
+    is zero to rounding), "moves" (names of the coordinates with the largest part).
 
     Attributes
     ----------
-    shapes : (n, modes) complex, eigenvectors, the largest displacement being one (of modes without displacements the largest state)
+    shapes : (n, modes) complex, eigenvectors, scaled to a largest displacement of one (for modes without displacements, a largest state of
+        one)
     """
 
     columns = ("eigenvalue", "frequency", "natural", "damping", "stable", "moves")
@@ -46,19 +47,19 @@ class Modes(TidyTable):
         return ", ".join(row[key]) if key == "moves" else super().cell(key, row)
 
     def plot(self, mode: int, amplitude: float = 0.3, phases: int = 5, ax: Any = None) -> Any:
-        """The stick figure swung along a mode's shape, Matplotlib's axes: from one end of the swing to the other, the middle drawn darkest.
+        """Draw the stick figure along a mode's shape, from one end of the swing to the other, the middle darkest. Returns Matplotlib axes.
 
         Parameters
         ----------
-        mode : which row
+        mode : number of the row
         amplitude : rad or m, of the coordinate that moves most
-        phases : figures that are drawn, an odd number so that the state itself is among them
+        phases : number of figures; an odd number includes the state itself
         """
         of, count, mode = self._of, max(1, whole(phases, "phases")), whole(mode, "mode")
         if not np.isfinite(amplitude := one_number(amplitude, "amplitude")):
-            raise _core.EvaluationError(f"amplitude={amplitude:g}: how far the coordinate swings that moves most, rad or m")
+            raise _core.EvaluationError(f"amplitude={amplitude:g}: give the amplitude of the coordinate that moves most, rad or m")
         if not -len(self) <= mode < len(self):
-            raise _core.EvaluationError(f"mode {mode} is not there; there are {len(self)}")
+            raise _core.EvaluationError(f"there is no mode {mode}; the model has {len(self)}")
         n = of.displacements
         shape = self.shapes[:n, mode] if of.tangent is None else of.tangent[: len(of.v)] @ self.shapes[:, mode]
         swing = np.real(shape * np.exp(-1j * np.angle(shape[np.abs(shape).argmax()]))) if n and np.abs(shape).max() > 0 else np.zeros(n)
@@ -73,7 +74,7 @@ class Modes(TidyTable):
 
 
 def modes_of(of: LinearModel) -> Modes:
-    """The modes of one linear model."""
+    """Return the modes of one linear model."""
     values, vectors = np.linalg.eig(of.A)
     if of.dt is not None:
         with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""What the inputs of a linear model reach and its outputs show, and the directions that they do not, by name."""
+"""Controllability and observability of a linear model, with the uncontrollable or unobservable directions by name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..arguments import one_number
 from .linear_model import LinearModel
 
 SHARE = 0.1
-"""A state is named in a direction where its entry is at least so much of the largest."""
+"""A direction names a state if its entry is at least this part of the largest."""
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,12 @@ class Reach:
 
     Attributes
     ----------
-    rank : dimension of that part
-    complete : whether it is all
+    rank : dimension of this part
+    complete : whether it is the whole state space
     directions : (n, n - rank), orthonormal: combinations of states that no input moves (displacements and velocities that no output shows)
-    names : for each direction the states that it is made of, with their shares, the largest first
+    names : the states in each direction with their shares, the largest first
     margin : the least singular value of [A - λI, B] over the eigenvalues λ (of [A* - λI, C*]), relative to ‖A‖ + ‖B‖, states balanced and
-        inputs of unit length: how near it is to losing a direction; 0 without states
+        inputs of unit length: the distance from losing a direction; 0 without states
     """
 
     kind: str
@@ -51,28 +51,28 @@ class Reach:
 
 
 def controllability_of(of: LinearModel, tolerance: Any = None) -> Reach:
-    """Of inputs. tolerance : relative, below which a singular value is zero; n eps √n where left out."""
+    """Return the reach of the inputs. tolerance : relative, below which a singular value is zero; default n eps √n."""
     return _reach("controllable", of.A, of.B, of.states, tolerance)
 
 
 def observability_of(of: LinearModel, tolerance: Any = None) -> Reach:
-    """Of outputs: the same of (A*, C*)."""
+    """Return the reach of the outputs: controllability of (A*, C*)."""
     return _reach("observable", of.A.T, of.C.T, of.states, tolerance)
 
 
 def _reach(kind: str, A: np.ndarray, B: np.ndarray, states: tuple[str, ...], tolerance: Any) -> Reach:
-    """The staircase by orthogonal changes of states: what B reaches, what A makes of that, and so on until nothing is new.
+    """Compute the staircase form by orthogonal changes of states: the range of B, its image under A, and so on until nothing is new.
 
     Source: P. Van Dooren, The generalized eigenstructure problem in linear system theory, IEEE Trans. Automatic Control 26 (1981).
     """
     n = len(A)
     relative = n**1.5 * np.finfo(float).eps if tolerance is None else one_number(tolerance, "tolerance")
     if not 0 <= relative < np.inf:
-        raise _core.EvaluationError(f"tolerance={relative:g}: below which share a singular value is zero, a number not negative")
+        raise _core.EvaluationError(f"tolerance={relative:g}: the relative size below which a singular value is zero, not negative")
     scale = balanced(A)
     A, B = A * (1 / scale)[:, None] * scale, B / scale[:, None]
     lengths = np.linalg.norm(B, axis=0)
-    B = B[:, lengths > 0] / lengths[lengths > 0]  # in what units inputs are decides about nothing
+    B = B[:, lengths > 0] / lengths[lengths > 0]  # the units of inputs do not matter
     basis, new, size = np.zeros((n, 0)), B, 1.0
     while basis.shape[1] < n:
         rest = new - basis @ (basis.T @ new)
@@ -84,7 +84,7 @@ def _reach(kind: str, A: np.ndarray, B: np.ndarray, states: tuple[str, ...], tol
         basis = np.hstack([basis, found])
         new, size = A @ found, float(np.linalg.norm(A))
     U = np.linalg.svd(basis, full_matrices=True)[0] if basis.shape[1] else np.eye(n)
-    left = U[:, basis.shape[1] :] / scale[:, None]  # of the states' own units: w*x is what no input moves
+    left = U[:, basis.shape[1] :] / scale[:, None]  # in the states' own units: no input moves w*x
     lost = np.linalg.qr(left)[0] if left.shape[1] else left
     names = tuple(_named(column, states) for column in lost.T)
     pencils = [np.hstack([A - value * np.eye(n), B]) for value in np.linalg.eigvals(A)] if n else []
@@ -94,7 +94,7 @@ def _reach(kind: str, A: np.ndarray, B: np.ndarray, states: tuple[str, ...], tol
 
 
 def balanced(A: np.ndarray) -> np.ndarray:
-    """Powers of two by which states are scaled so that rows and columns of A are alike in size: units decide about no rank."""
+    """Return powers of two that scale the states so that rows and columns of A have similar sizes: the rank does not depend on units."""
     from scipy.linalg import matrix_balance
 
     return matrix_balance(A, permute=False, separate=True)[1][0] if len(A) else np.ones(0)

@@ -1,1 +1,1 @@
-"""Models: the multibody system, loaders (URDF, MJCF), generators and the robots that come with the package."""
+"""Models: the multibody system, loaders (URDF, SDF, MJCF, TOML), generators and the robots of the package."""

@@ -1,4 +1,4 @@
-"""What a model's file said beside the model, by coordinate, when the structure changes: carried over by hinge name, as q and v are."""
+"""Further data of a model's file, by coordinate, when the structure changes: carried over by hinge name, as q and v are."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Asides:
-    """What is beside a model now (`left_aside`, `actuators`), to be put beside it, or another one, after an edit."""
+    """The present data beside a model (`left_aside`, `actuators`), to be restored to it, or added to another one, after an edit."""
 
     def __init__(self, model: Any):
         self._values: dict[str, np.ndarray] = model._left_aside
@@ -17,8 +17,8 @@ class Asides:
         self._slices = _slices(model) if self._values or self._actuators else {}
 
     def put(self, model: Any, *, changed: Iterable[str] = (), turned: Iterable[str] = ()) -> None:
-        """Beside the model that it was taken of. Nothing is kept of hinges that are other ones now, `changed`; those that were turned
-        round have their coordinates in the other order."""
+        """Restore the data to the model that they came from. Data of replaced hinges, `changed`, are dropped; hinges that were reversed
+        have their coordinates in reverse order."""
         if not self._slices:
             return
         now, gone = _slices(model), set(changed)
@@ -29,13 +29,13 @@ class Asides:
         self._overlay(model, now, names, reverse, str)
 
     def add(self, model: Any, hinges: Mapping[str, str], rename: Callable[[str], str]) -> None:
-        """Of hinges that were copied into a model, by their old names: to what is beside that model. `rename` is for actuators."""
+        """Add the data of hinges that were copied into a model, by their old names, to that model. `rename` applies to actuators."""
         if self._slices:
             model._left_aside, model._actuators = dict(model._left_aside), list(model._actuators)
             self._overlay(model, _slices(model), hinges, set(), rename)
 
     def of(self, hinge: str) -> dict[str, Any]:
-        """What is beside a model of this hinge, to be put back where it is the same hinge again."""
+        """Return the data of this hinge, to be restored when the same hinge returns."""
         if not self._slices:
             return {}
         own, names = self._slices[hinge], set(_coordinates(hinge, self._slices[hinge][1]))
@@ -43,7 +43,7 @@ class Asides:
         return {"left aside": values, "actuators": [actuator for actuator in self._actuators if actuator["coordinate"] in names]}
 
     def put_back(self, model: Any, hinge: str, kept: Mapping[str, Any]) -> None:
-        """What `of` gave of this hinge, beside the model."""
+        """Restore the data that `of` returned for this hinge."""
         for key, values in kept.get("left aside", {}).items():
             of_q = key == "spring rest"
             made = model._left_aside.setdefault(key, np.array(model.zero_q()) if of_q else np.full(model.nv, np.nan))
@@ -79,6 +79,6 @@ def _slices(model: Any) -> dict[str, tuple[slice, slice]]:
 
 
 def _coordinates(hinge: str, own: slice) -> list[str]:
-    """What the coordinates of a hinge are called."""
+    """Return the names of a hinge's coordinates."""
     size = own.stop - own.start
     return [hinge] if size == 1 else [f"{hinge}[{j}]" for j in range(size)]

@@ -1,4 +1,4 @@
-"""States on the loops of a model: found from near and far, or said why there are none (docs/loops.md)."""
+"""Find states on the loops of a model, from near and far, or explain why there are none (docs/loops.md)."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .coordinates import coordinate_numbers
 from .limits import pin_coordinates
 
 _ITERATIONS = 200
-_LARGEST = 1e150  # of residuals and rows: squares are within doubles; there is no way from what is further off
-_RANK = 1e-10  # relative: singular values below are rounding, of rows that hang on others
-_STOPPED = 1e-13  # rad/s, m/s, and of the velocities asked for: less is what rounding leaves of those that stopped
+_LARGEST = 1e150  # of residuals and rows: squares are within doubles; larger ones are hopeless
+_RANK = 1e-10  # relative: smaller singular values are rounding, of dependent rows
+_STOPPED = 1e-13  # rad/s, m/s, and relative to the velocities given: smaller ones are rounding
 
 
 class Assembler:
-    """The positions of a model's loops as equations for the coordinates that are not kept.
+    """The positions of a model's loops as equations for the coordinates that are not fixed.
 
-    Levenberg's method with the damping of Nielsen on the model's group: q moves along δ,  (QᵀQ + μ)δ = -Qᵀr,  and at last along the
-    shortest δ with Qδ = -r in the least-squares sense, so that coordinates around no loop stay. Source: K. Madsen, H. Nielsen, O. Tingleff,
+    Levenberg's method with the damping of Nielsen on the model's group: q moves along δ, (QᵀQ + μ)δ = -Qᵀr, and finally along the shortest
+    δ with Qδ = -r in the least-squares sense, so that coordinates around no loop do not move. Source: K. Madsen, H. Nielsen, O. Tingleff,
     Methods for Non-Linear Least Squares Problems, 2004, 3.2.
     """
 
@@ -37,14 +37,14 @@ class Assembler:
         self.kept = coordinate_numbers(model, [] if fix is None else fix) or []
         self._check_kept()
         self.free = np.setdiff1d(np.arange(model.nv), self.kept)
-        model.configuration_rate(self.q, np.zeros(model.nv))  # what is wrong with q is said here
+        model.configuration_rate(self.q, np.zeros(model.nv))  # the core reports faults of q
         elsewhere = model.random_state().q
         moves = sum((model.loops.jacobian(at) != 0).any(axis=0) for at in (self._with_rows(self.q), elsewhere))
         self.around = self.free[moves[self.free] > 0]
         self.sizes = np.maximum(model.loops.sizes(self._with_rows(self.q)), model.loops.sizes(elsewhere))
 
     def _with_rows(self, q: np.ndarray) -> np.ndarray:
-        """q, or another state where the rows have no direction there, as those of a wheel that lies flat."""
+        """Return q, or another state if the rows have no direction there, such as those of a wheel that lies flat."""
         try:
             self.model.loops.residual(q)
         except _core.EvaluationError:
@@ -52,27 +52,27 @@ class Assembler:
         return q
 
     def _check_kept(self) -> None:
-        """A rotation is kept whole, or not: one of its three velocities alone says nothing of where it is."""
+        """Check that rotations are fixed as a whole or not at all: one of the three velocities alone does not determine a rotation."""
         for hinge in self.model.hinges.values():
             own = range(hinge.v_slice.start, hinge.v_slice.stop)
             some = set(own) & set(self.kept)
             if 0 < len(some) < len(own) and hinge.q_slice.stop - hinge.q_slice.start != len(own):
                 raise _core.ModelError(
-                    f"hinge {hinge.name!r} has a rotation, of which single coordinates cannot be kept; fix all of it: {hinge.name!r}"
+                    f"hinge {hinge.name!r} has a rotation, and its coordinates cannot be fixed one by one; fix the hinge: {hinge.name!r}"
                 )
 
     def equations(self, q: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r and Q of these rows, by the coordinates that may move."""
+        """Return r and Q of these rows, by the coordinates that may move."""
         return self.model.loops.residual(q)[rows], self.model.loops.jacobian(q)[rows][:, self.free]
 
     def moved(self, q: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """q moved along a step of the coordinates that may move; the others to the last bit what they were."""
+        """Return q moved along a step of the coordinates that may move; the others do not change in any bit."""
         whole = np.zeros(self.model.nv)
         whole[self.free] = step
         return self.model.integrate(q, whole)
 
     def solve(self, q: np.ndarray, rows: np.ndarray | None = None) -> tuple[np.ndarray, float]:
-        """The state reached from q, and the largest residual left there, by the sizes of the rows."""
+        """Return the state reached from q, and the largest residual there, relative to the sizes of the rows."""
         rows = np.flatnonzero(self.positions) if rows is None else rows
         r, Q = self.equations(q, rows)
         if not r.size or not Q.size or max(np.abs(r).max(), np.abs(Q).max()) > _LARGEST:
@@ -96,11 +96,11 @@ class Assembler:
         return self.refined(q, r, Q, rows)
 
     def left(self, r: np.ndarray, rows: np.ndarray) -> float:
-        """The largest of these residuals, by how far the coordinates move each row."""
+        """Return the largest of these residuals, relative to how far the coordinates move each row."""
         return float((np.abs(r) / self.sizes[rows]).max(initial=0))
 
     def refined(self, q: np.ndarray, r: np.ndarray, Q: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, float]:
-        """To rounding, from where the rows are kept to the tolerance: undamped steps as long as each leaves less than half."""
+        """Refine to rounding a state that satisfies the rows to the tolerance: undamped steps as long as each halves the residual."""
         left = self.left(r, rows)
         while 0 < left <= self.tolerance:
             onto = self.moved(q, np.linalg.lstsq(Q, -r, rcond=_RANK)[0])
@@ -111,7 +111,7 @@ class Assembler:
         return q, left
 
     def starts(self, count: int, rng: np.random.Generator) -> Any:
-        """q, and then states about it, further and further off: by a tenth of a radian or metre at first, by π at last."""
+        """Yield q, then states around it at growing distances: a tenth of a radian or metre at first, π at last."""
         yield self.q
         for width in np.geomspace(0.1, np.pi, max(count - 1, 1))[: count - 1]:
             step = np.zeros(len(self.free))
@@ -120,7 +120,7 @@ class Assembler:
 
     # ------------------------------------------------------------------ velocities
     def velocities(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """The velocities that keep all rows with the least change of those that may change. ModelError where there are none."""
+        """Return the velocities that keep all rows with the least change of those that may change. ModelError if there are none."""
         Q = self.model.loops.jacobian(q)
         v = np.array(v, float)
         asked = np.abs(v).max(initial=0)
@@ -132,18 +132,18 @@ class Assembler:
         if (off / self.sizes).max(initial=0) > self.tolerance * asked + _STOPPED:
             said = _worst(self.model.loops.rows, off)
             raise _core.ModelError(
-                f"no velocities of {self.model.name!r} keep its loops{self.keeping()}: left are {said}; fix fewer, or give others"
+                f"no velocities of {self.model.name!r} keep its loops{self.keeping()}: these remain: {said}; fix fewer, or give others"
             )
         return v
 
-    # ------------------------------------------------------------------ what is said
+    # ------------------------------------------------------------------ messages
     def keeping(self) -> str:
-        """Which coordinates are kept."""
+        """Return in words which coordinates are fixed."""
         names = self.model.coordinate_names
         return f" with {', '.join(repr(names[i]) for i in self.kept[:6])}{', ...' if len(self.kept) > 6 else ''} kept" if self.kept else ""
 
     def refusal(self, q: np.ndarray, count: int) -> _core.ModelError:
-        """Why nothing was found, from the state with the smallest residual: loops that cannot be closed, or not together."""
+        """Return an error with the reason, from the state with the smallest residual: loops that cannot be closed, or not together."""
         loops, rows = self.model.loops, self.model.loops.rows
         residual = np.abs(loops.residual(q))
         alone = []
@@ -154,13 +154,13 @@ class Assembler:
                 alone.append(loop.name)
         open_ = [loop.name for loop in loops.values() if (residual / self.sizes)[loop.slice].max(initial=0) > self.tolerance]
         why = (
-            f"{_named(alone)} cannot be closed even without the others"
+            f"{_named(alone)} cannot be closed even alone"
             if alone
-            else f"each can be closed by itself, and {_named(open_)} not together with the others"
+            else f"each can be closed by itself, but {_named(open_)} not together with the others"
         )
         return _core.ModelError(
             f"{self.model.name!r} cannot be assembled{self.keeping()}, from {count} start{'s' if count > 1 else ''}: {why}. At the nearest "
-            f"that was found, left are {_worst(rows, residual)}; change lengths or kept values, or start elsewhere (q0, starts=)"
+            f"state found these remain: {_worst(rows, residual)}; change lengths or kept values, or start elsewhere (q0, starts=)"
         )
 
 
@@ -169,13 +169,13 @@ def _named(names: list[str]) -> str:
 
 
 def _worst(rows: list[str], off: np.ndarray) -> str:
-    """The rows that are most off, with how much."""
+    """Return the rows with the largest residuals, in words."""
     order = [i for i in np.argsort(-off)[:4] if off[i] > 0.01 * off.max()]
     return ", ".join(f"{off[i]:.3g} of {rows[i]!r}" for i in order)
 
 
 def _finite(model: Any, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
-    """q and v of one state by the core's own rules: ModelError names the hinge of what is no number."""
+    """Return q and v of one state by the core's own rules: ModelError names the hinge of a value that is not finite."""
     model.configuration_rate(q, v)
     return q, v
 
@@ -186,7 +186,7 @@ def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, to
     if np.ndim(q) == np.ndim(v) == 1:
         return _assembled_one(model, q, v, fix, starts, seed_of(seed), tolerance)
     several = max(len(one) for one in (q, v) if np.ndim(one) == 2)
-    Assembler(model, model.zero_q(), fix, tolerance)  # what is wrong with these is said of no state
+    Assembler(model, model.zero_q(), fix, tolerance)  # faults of these arguments belong to no state
     rng, states = seed_of(seed), State(np.zeros((several, model.nq)), np.zeros((several, model.nv)))
     for i, (one, along) in enumerate(zip(np.broadcast_to(q, states.q.shape), np.broadcast_to(v, states.v.shape), strict=True)):
         try:
@@ -200,12 +200,12 @@ def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, to
 def _assembled_one(model: Any, q: Any, v: Any, fix: Any, starts: Any, rng: np.random.Generator, tolerance: Any) -> State:
     assembler, count = Assembler(model, q, fix, tolerance), clipped(starts, "starts")
     if count < 1:
-        raise _core.ModelError(f"starts: how many are tried, at least 1, not {starts!r}")
+        raise _core.ModelError(f"starts: the number of starting states, at least 1, not {starts!r}")
     best, smallest, no_rows = assembler.q, np.inf, None
     for start in assembler.starts(count, rng):
         try:
             found, left = assembler.solve(start)
-        except _core.EvaluationError as error:  # rows that have no direction on the way
+        except _core.EvaluationError as error:  # rows without a direction on the way
             no_rows = error
             continue
         if left <= assembler.tolerance:
@@ -246,7 +246,7 @@ def branches(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, tol
 
 
 def turns_of(model: Any) -> np.ndarray:
-    """Which coordinates are angles that may be wound by whole turns: pins in no coupling."""
+    """Return which coordinates are angles that may wind by whole turns: pins in no coupling."""
     turns = pin_coordinates(model)
     for loop in model.loops.values():
         if loop.kind == "coupling":
@@ -255,7 +255,7 @@ def turns_of(model: Any) -> np.ndarray:
 
 
 def between(model: Any, p: np.ndarray, q: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """The way from p to q, by the shorter turn."""
+    """Return the displacement from p to q, by the shorter turn."""
     way = np.array(model.difference(p, q))
     way[turns] -= 2 * np.pi * np.round(way[turns] / (2 * np.pi))
     return way

@@ -1,4 +1,4 @@
-"""Bare trees of matrices: the algebra without any mechanics."""
+"""Bare trees of matrices: the algebra without mechanics."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ def sko_model(
     names: Sequence[str] | None = None,
     name: str = "SKO model",
 ) -> OperatorSet:
-    """The operators of a bare tree of matrices: the algebra without any mechanics, blocks of any size per body.
+    """Return the operators of a bare tree of matrices: the algebra without mechanics, blocks of any size per body.
 
     Parameters
     ----------
     parents : parents before children, -1 for the base
     E : (s_parent, s_k) block of each body, None for roots
-    H, M, J : (n_k, s_k), symmetric (s_k, s_k), symmetric (n_k, n_k); J zero if left out
-        A row of H alone may be (s_k,), a J of one coordinate a number.
-    names : body names, all different; "body0", "body1", ... if left out
+    H, M, J : (n_k, s_k), symmetric (s_k, s_k), symmetric (n_k, n_k); default of J: zero
+        A row of H alone may be (s_k,), a J of one coordinate a scalar.
+    names : body names, all different; default: "body0", "body1", ...
 
     Raises
     ------
     ModelError
-        A block of another shape, also of one transposed, a root's E, an entry that is not finite, M or J that is not symmetric, numbers
-        of blocks and names that differ: names operator, body and shapes.
+        A block of the wrong shape or transposed, an E of a root, an entry that is not finite, M or J that is not symmetric, different
+        numbers of blocks and names: the error names operator, body and shapes.
 
     Examples
     --------
@@ -71,11 +71,11 @@ def sko_model(
 
 
 def _listed(what: str, blocks: Any, count: int, name: str) -> list[Any]:
-    """The blocks of one operator, one a body."""
+    """Return the blocks of one operator, one per body."""
     if isinstance(blocks, str) or not hasattr(blocks, "__len__"):
-        raise _core.ModelError(f"{what} of {name!r}: a list of one block a body, not {blocks!r}")
+        raise _core.ModelError(f"{what} of {name!r}: a list with one block per body, not {blocks!r}")
     if len(blocks) != count:
-        raise _core.ModelError(f"{what} of {name!r}: {len(blocks)} for {count} bodies; give one a body")
+        raise _core.ModelError(f"{what} of {name!r}: {len(blocks)} for {count} bodies; give one per body")
     return list(blocks)
 
 
@@ -88,7 +88,7 @@ def _square(what: str, block: Any, size: int | None = None) -> np.ndarray:
     if size == 1 and numbers.ndim == 0:
         numbers = numbers.reshape(1, 1)
     if numbers.ndim != 2 or numbers.shape[0] != numbers.shape[1] or size not in (None, len(numbers)):
-        raise _refuse(what, numbers, "a square matrix" if size is None else f"({size}, {size}), one row a coordinate")
+        raise _refuse(what, numbers, "a square matrix" if size is None else f"({size}, {size}), one row per coordinate")
     return numbers
 
 
@@ -97,7 +97,7 @@ def _rows(what: str, block: Any, size: int) -> np.ndarray:
     if numbers.ndim == 1 and numbers.size == size:
         numbers = numbers.reshape(1, size)
     if numbers.ndim != 2 or numbers.shape[1] != size:
-        raise _refuse(what, numbers, f"(n, {size}): a row a coordinate, a column for each of the body's {size} rows of M")
+        raise _refuse(what, numbers, f"(n, {size}): a row per coordinate, a column for each of the body's {size} rows of M")
     return numbers
 
 

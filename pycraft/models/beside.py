@@ -1,4 +1,4 @@
-"""What a model's file says beside bodies and hinges: numbers for effects, and the names of what is not read."""
+"""Data of a model's file beside bodies and hinges: parameters of effects, and the names of elements that are not read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .shapes import Shape
 
 
 class Beside:
-    """What stands beside a model that was loaded; all of it is empty for a model that was built or generated."""
+    """Data beside a loaded model; all of it is empty for a model that was built or generated."""
 
     _left_aside: dict[str, np.ndarray]
     _actuators: list[dict[str, Any]]
@@ -25,33 +25,33 @@ class Beside:
 
     @property
     def left_aside(self) -> dict[str, np.ndarray]:
-        """What the model's file says beside the model, by name; empty for a model that was not loaded.
+        """Data of the model's file that are not part of the model, by name; empty for a model that was not loaded.
 
         "gravity" (3,), m/s²; per coordinate (nv,), NaN where the file has none: "damping", "quadratic damping", "friction", "stiffness",
-        and "effort limit", "velocity limit"; "spring rest" (nq,), where springs are slack, if that is not zero.
-        `pycraft.effects.from_model` makes effects of them; `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` takes
-        the first of these. The arrays are read-only.
+        and "effort limit", "velocity limit"; "spring rest" (nq,), the rest positions of springs, unless they are zero.
+        `pycraft.effects.from_model` makes effects of them; `integrate_ode(..., damping=np.nan_to_num(arm.left_aside["damping"]))` uses the
+        first of these. The arrays are read-only.
         """
         return {name: fixed(values) for name, values in self._left_aside.items()}
 
     @property
     def actuators(self) -> list[dict[str, Any]]:
-        """The actuators of the model's file, none for a model that was not loaded: `pycraft.effects.from_model` makes effects of them.
+        """The actuators of the model's file, empty for a model that was not loaded: `pycraft.effects.from_model` makes effects of them.
 
-        Each a dictionary: "name", "coordinate", "gear", "gain", "bias" (3,), "control", the one that stands for zero, "force range" (2,),
-        and "why not" of one that no effect is, else None. With a control u the force at the coordinate is gear · clip(gain u + bias · (1,
-        gear q, gear v), force range).
+        Each is a dictionary: "name", "coordinate", "gear", "gain", "bias" (3,), "control", the value that stands for zero, "force range"
+        (2,), and "why not", the reason why no effect represents it, or None. With a control u the force at the coordinate is gear ·
+        clip(gain u + bias · (1, gear q, gear v), force range).
         """
         return [{key: fixed(value) for key, value in actuator.items()} for actuator in self._actuators]
 
     @property
     def offers(self) -> list[Offer]:
-        """The weights that are held and the boxes in a fluid of the model's file: `pycraft.effects.from_model` makes effects of them."""
+        """Gravity compensation and boxes in a fluid from the model's file: `pycraft.effects.from_model` makes effects of them."""
         return list(self._offers)
 
     @property
     def not_read(self) -> list[str]:
-        """What changes motions in the program that the model's file is for, and is neither in the model nor an effect here, in words.
+        """Elements that change motions in the program of the model's file, but are neither in the model nor available as effects, in words.
 
         Contacts, tendons, plugins and the like of an MJCF file, empty for a model that was not loaded. `pycraft.effects.from_model`
         repeats it.

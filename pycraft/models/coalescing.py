@@ -1,4 +1,4 @@
-"""Bodies that are joined rigidly made one, split again, and massless leaves pruned."""
+"""Coalesce rigidly joined bodies, split them again, and prune massless leaves."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ Pose = tuple[np.ndarray, np.ndarray]
 
 
 class Coalescing(Locking):
-    """Bodies that became one with what carries them, and come back."""
+    """Bodies that were coalesced with their carriers, and can be split again."""
 
     _bodies_before: Mapping[str, dict[str, Any]] = {}
-    """Of each coalesced body, in the order in which they were: "body" as it was; "carrier", empty for the base; "next", the body that
-    stood after it there; mass properties of the carrier "before" and "after"; "children" that hung on it, each with its placement there and
-    the one that it has since; "nodes" that were on it, each with its pose there."""
+    """For each coalesced body, in order of coalescing: "body" as it was; "carrier", empty for the base; "next", the body that followed it
+    there; mass properties of the carrier "before" and "after"; "children" that it carried, each with its placement there and the present
+    one; "nodes" that were on it, each with its pose there."""
 
     def coalesce(self, bodies: Any = None) -> list[str]:
-        """Make bodies that hang on a weld one with what carries them, all where none are named.
+        """Coalesce bodies on welds with their carriers; default: all of them.
 
-        The carrier takes their mass properties; what hung on them, and their nodes, are where they were, and their names are nodes. So it
-        is with welds of a file that is loaded with welds="lump". Mass matrix, motions, momentum and energy stay, to rounding; on the base
-        the body's mass is no longer there, which moves nothing (potential energy counts from elsewhere). Coordinates and their order stay.
+        The carrier takes their mass properties; bodies and nodes that they carried stay where they were, and their names become nodes, as
+        with welds of a file that is loaded with welds="lump". Mass matrix, motions, momentum and energy stay, to rounding; on the base the
+        body's mass is no longer counted, which moves nothing (potential energy has another datum). Coordinates and their order stay.
 
         Parameters
         ----------
@@ -45,10 +45,10 @@ class Coalescing(Locking):
         Raises
         ------
         ModelError
-            An unknown body, one that hangs on a hinge that moves (lock it first), one that a loop closes a chain to what it would be one
-            body with, a part. The model is as it was.
+            An unknown body, a body on a hinge that moves (lock it first), a body in a chain that a loop closes to its future carrier, a
+            part. The model is unchanged.
 
-        Cost: O(N) once, that of some forward dynamics; each evaluation takes a body's step less for each of them.
+        Cost: O(N) once, as a few calls of forward dynamics; each evaluation then saves one body's step per coalesced body.
 
         Examples
         --------
@@ -72,13 +72,13 @@ class Coalescing(Locking):
         return self._coalesced_now(numbers)
 
     def split(self, bodies: Any = None) -> list[str]:
-        """Split coalesced bodies off, all where none are named: each is a body on its weld again, and what was on it is on it again.
+        """Split coalesced bodies off; default: all of them. Each is a body on its weld again, and carries what it carried before.
 
-        In any order: what is in the way, a carrier that is coalesced itself or what hung on the body and was coalesced later, is split off
-        and coalesced again. A hinge that was locked can then be unlocked.
+        The order is free: obstacles, such as a carrier that is coalesced itself or a body that was carried by it and coalesced later, are
+        split off and coalesced again. A locked hinge of the body can then be unlocked.
 
-        Where nobody set the carrier's mass properties since, they and all placements are what they were to the last bit. Else the body's
-        own are taken from them; placements that were set move along.
+        If the carrier's mass properties were not set since, they and all placements are restored to the last bit. Else the body's own are
+        subtracted from them; placements that were set move along.
 
         Parameters
         ----------
@@ -91,10 +91,10 @@ class Coalescing(Locking):
         Raises
         ------
         ModelError
-            A body that is not coalesced; what remains is no possible body (a mass below zero, an inertia with a negative moment); a hinge
-            that is called as the body's own was added meanwhile; a part. The model is as it was.
+            A body that is not coalesced; a remainder that is not a possible body (a mass below zero, an inertia with a negative moment); a
+            hinge with the name of the body's own that was added meanwhile; a part. The model is unchanged.
 
-        Cost: as of `coalesce`.
+        Cost: as `coalesce`.
         """
         self._split([])  # a part refuses
         there = self.coalesced
@@ -113,12 +113,12 @@ class Coalescing(Locking):
         return [name for name in opened if name in set(wanted)]
 
     def prune(self) -> list[str]:
-        """Make massless leaves nodes of what carries them, where they are, and again until there are none.
+        """Make massless leaves nodes of their carriers, repeatedly until there are none.
 
-        A leaf has nothing outboard; it is massless where it has neither mass nor inertia, and its hinge no rotor inertia. Such bodies move
-        nothing, and forward dynamics refuses the hinges that move them; where a loop is closed or a hinge coupled they carry forces, and
-        stay. The names, nodes and frames of those pruned stay, fixed to the body that carries them. They are locked and coalesced, so that
-        `split` and `unlock` bring them back.
+        A leaf has nothing outboard; it is massless if it has neither mass nor inertia, and its hinge no rotor inertia. Such bodies move
+        nothing, and forward dynamics refuses the hinges that move them; bodies with a loop closure or a coupled hinge carry forces, and
+        stay. The names, nodes and frames of pruned bodies stay, fixed to their carriers. They are locked and coalesced, so that `split` and
+        `unlock` restore them.
 
         Returns
         -------
@@ -127,7 +127,7 @@ class Coalescing(Locking):
         Raises
         ------
         ModelError
-            A part, whose structure is the whole's.
+            A part: its structure belongs to the whole model.
 
         Examples
         --------
@@ -152,18 +152,18 @@ class Coalescing(Locking):
                 if body["parent"] >= 0:
                     outboard[body["parent"]] -= 1
         pruned.reverse()
-        self._locked_now([k for k in pruned if data[k]["hinge"]["subhinges"]], np.array(self.v))  # massless: nothing else moves otherwise
+        self._locked_now([k for k in pruned if data[k]["hinge"]["subhinges"]], np.array(self.v))  # massless: no other motion changes
         return self._coalesced_now(pruned)
 
     @property
     def coalesced(self) -> list[str]:
-        """Names of the bodies that are coalesced, in the order in which they were; of a part those that are its own."""
+        """Names of the coalesced bodies, in order of coalescing; for a part, its own."""
         if self._whole is not None:
             own = {node["name"] for node in self._nodes()}
             return [name for name in self._whole.coalesced if name in own]
         return list(self._bodies_before)
 
-    def remove_body(self, name: str | Body, *, with_uses: bool = False) -> Removed:  # what was locked or coalesced there goes along
+    def remove_body(self, name: str | Body, *, with_uses: bool = False) -> Removed:  # locked and coalesced bodies there go along
         removed = super().remove_body(name, with_uses=with_uses)
         if not self._bodies_before and not self._hinges_before:
             return removed
@@ -177,17 +177,17 @@ class Coalescing(Locking):
 
     # ------------------------------------------------------------------ loops
     def _closed_between(self) -> dict[str, tuple[int, int]]:
-        """Of each loop that is no coupling the numbers of the bodies that it joins, -1 of the base."""
+        """Return, for each loop except couplings, the numbers of the bodies that it joins, -1 for the base."""
         ends = {name: self.loops.ends_of(name) for name in self._kept_loops or () if self.loops[name].kind != "coupling"}
         return {name: (self._frame_body(b) if b else -1, self._frame_body(a) if a else -1) for name, (b, a) in ends.items()}
 
     def _held_by_loops(self) -> set[int]:
-        """Numbers of the bodies that loops are closed at, and of those on coupled hinges."""
+        """Return the numbers of the bodies with loop closures, and of those on coupled hinges."""
         coupled = [self.loops._stands_on(name) for name in self._kept_loops or () if self.loops[name].kind == "coupling"]
         return {self._hinge_index(hinge) for hinge in set().union(*coupled)}.union(*self._closed_between().values())
 
     def _require_open(self, numbers: list[int]) -> None:
-        """A loop of a body with itself would say nothing of a motion, and no copy and no file would take it."""
+        """Check for loops of a body with itself: they would not constrain any motion, and neither copies nor files could hold them."""
         joined = set(numbers)
 
         def carrier(k: int) -> int:
@@ -215,9 +215,9 @@ class Coalescing(Locking):
 
     # ------------------------------------------------------------------ splitting
     def _in_the_way(self, wanted: list[str]) -> list[str]:
-        """What has to be split off for these, the last coalesced first.
+        """Return the bodies to split off for these, the last coalesced first.
 
-        What carries one that is coalesced was so later, and so was what hung on it.
+        The carrier of a coalesced body was coalesced later, and so were bodies that it carried.
         """
         records, found, open_ = self._bodies_before, set(wanted), list(wanted)
         while open_:
@@ -229,7 +229,7 @@ class Coalescing(Locking):
         return [name for name in reversed(list(records)) if name in found]
 
     def _plan_of(self, opened: list[str]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
-        """What the core is told of each, and the records that are left."""
+        """Return the core's instructions for each, and the remaining records."""
         left = {name: dict(one) for name, one in self._bodies_before.items()}
         on: dict[str, list[str]] = {}
         for name, one in left.items():
@@ -259,7 +259,8 @@ class Coalescing(Locking):
         return plan, left
 
     def _mass_without(self, one: dict[str, Any], later: list[dict[str, Any]], masses: dict[str, Mass]) -> Mass:
-        """The carrier's mass properties without this body: what they were, and what came later joined again, if nobody set any."""
+        """Return the carrier's mass properties without this body: the earlier ones, and later additions joined again, unless they were
+        set."""
         carrier = one["carrier"]
         now = masses[carrier] if carrier in masses else _mass(self._body(self._body_index(carrier)))
         steps = [one, *later]
@@ -275,14 +276,15 @@ class Coalescing(Locking):
         return mass
 
     def _placement_of(self, body: str) -> Pose | None:
-        """Of its hinge; None where there is no such body."""
+        """Return the placement of its hinge; None if there is no such body."""
         try:
             return _pose(self._body(self._body_index(body))["hinge"])
         except _core.ModelError:
             return None
 
     def _places(self, following: str, left: Mapping[str, dict[str, Any]]) -> list[str]:
-        """What a body without children stands before: what followed it; where that is coalesced, what hung on it or followed it."""
+        """Return the bodies that may follow a body without children: its former successor; if that is coalesced, its children or
+        successor."""
         places: list[str] = []
         while following in left:
             places += left[following]["children"]
@@ -291,7 +293,7 @@ class Coalescing(Locking):
 
     # ------------------------------------------------------------------ files and copies
     def _described_edits(self) -> dict[str, Any]:
-        """What a copy needs to unlock and split; of a part what is its own."""
+        """Return the data that a copy needs to unlock and split; for a part, its own."""
         of_whole = self if self._whole is None else self._whole
         locked, coalesced = set(self.locked), {name: of_whole._bodies_before[name] for name in self.coalesced}
         hinges = {name: one for name, one in of_whole._hinges_before.items() if name in locked or one["body"] in coalesced}
@@ -326,5 +328,5 @@ def _inverse(X: Pose) -> Pose:
 
 
 def _same(a: Iterable[Any], b: Iterable[Any]) -> bool:
-    """To the last bit but the sign of zero."""
+    """Check that values are equal to the last bit, except for the sign of zero."""
     return all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))

@@ -1,4 +1,4 @@
-"""Coordinates of a model as users name them: hinges, single coordinates, numbers."""
+"""Coordinates of a model as users give them: hinges, single coordinates, numbers."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..arguments import several, whole
 
 
 def coordinate_numbers(model: Any, given: Any) -> list[int] | None:
-    """The numbers of the coordinates that are named, in their order; None, for all, where nothing is given.
+    """Return the numbers of the named coordinates, in their order; None, for all, if nothing is given.
 
-    Each is the name of a hinge (all its coordinates), a handle of one, the name of a coordinate, or a number. ModelError for one that is
-    not there, with the nearest name, or named twice.
+    Each is the name of a hinge (all its coordinates), its handle, the name of a coordinate, or a number. ModelError for an unknown one,
+    with the nearest name, or one named twice.
     """
     if given is None:
         return None

@@ -1,4 +1,4 @@
-"""Curves that points stay on: piecewise polynomials of whatever a user gives for one, and normals along them (cpp/model/curve.h)."""
+"""Curves for points on loops: piecewise polynomials from any representation of a user, and normals along them (cpp/model/curve.h)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.polynomial import chebyshev
 
 from .. import _core
 
-_DEGREE = 12  # of a function's pieces: where they end, two derivatives are 144²/3 times as far off as it is, 1e-10
+_DEGREE = 12  # of a function's pieces: at their ends two derivatives have 144²/3 times its error, 1e-10
 _EPS = float(np.finfo(float).eps)
 _HALVES = 24  # of a piece, until it is smooth enough
-_TURN = 0.25  # rad, of the tangent over a quarter of a piece: normals between the ends of one are then close to those of the ends
+_TURN = 0.25  # rad, of the tangent over a quarter of a piece: normals between the ends of one are then close to the normals at the ends
 
 
 class Curve(NamedTuple):
@@ -25,10 +25,15 @@ class Curve(NamedTuple):
     closed: bool
 
 
-def curve_of(given: Any, parameters: Any, closed: Any, what: str) -> Curve:
-    """The curve through points, of a piecewise polynomial of SciPy's, or of a function: see `Multibody.add_curve`."""
+def curve_of(given: Any, parameters: Any, closed: Any, what: str, ends: Any = "not-a-knot") -> Curve:
+    """Return the curve through points, of a SciPy piecewise polynomial, or of a function: see `Multibody.add_curve`."""
     if not isinstance(closed, (bool, np.bool_)):
         raise _core.ModelError(f"{what}: closed is True or False, not {closed!r}")
+    if ends not in ("not-a-knot", "natural"):
+        raise _core.ModelError(f"{what}: the ends of a curve through points are 'not-a-knot' or 'natural', not {ends!r:.80}")
+    if ends != "not-a-knot" and (closed or callable(given)):
+        kind = "a closed curve has no ends" if closed else "a function and a piecewise polynomial have ends of their own"
+        raise _core.ModelError(f"{what}: {kind}; leave out ends={ends!r}")
     s = None if parameters is None else np.array(_core.real_array(parameters, f"parameters of {what}"))
     if s is not None and (s.ndim != 1 or len(s) < 2 or not np.isfinite(s).all() or not (np.diff(s) > 0).all()):
         raise _core.ModelError(f"{what}: parameters are two numbers at least, finite, and ascend")
@@ -41,12 +46,12 @@ def curve_of(given: Any, parameters: Any, closed: Any, what: str) -> Curve:
             raise _core.ModelError(f"{what}: beside a function give parameters=(first, last), between which it is the curve")
         found = _fitted(given, s, what)
     else:
-        found = _through(given, s, bool(closed), what)
+        found = _through(given, s, "periodic" if closed else ends, what)
     return checked(Curve(*found, bool(closed)), what)
 
 
 def checked(curve: Curve, what: str) -> Curve:
-    """The curve itself. ModelError where it is not finite, jumps, or has a corner between two pieces."""
+    """Return the curve itself. ModelError if it is not finite, jumps, or has a corner between two pieces."""
     s, c, closed = curve
     if c.ndim != 3 or c.shape[2] != 3 or len(c) < 1 or c.shape[1] < 2 or len(s) != len(c) + 1:
         raise _core.ModelError(f"{what}: coefficients are (pieces, order, 3), order at least 2, and parameters one more than pieces")
@@ -63,13 +68,13 @@ def checked(curve: Curve, what: str) -> Curve:
         if not np.abs(ends[i] - begins[after]).max() <= 1e-9 * size:
             remedy = "a closed curve ends where it begins" if after == 0 else "a curve is continuous"
             raise _core.ModelError(f"{what}: its curve jumps at parameter {at:g}; {remedy}")
-        if np.abs(leaves[i] - enters[after]).max() > 1e-6:  # of tangents that are none, too: NaN is no corner, and with_normals says so
+        if np.abs(leaves[i] - enters[after]).max() > 1e-6:  # NaN tangents are no corner; with_normals reports them
             raise _core.ModelError(f"{what}: its curve has a corner at parameter {at:g}, where it has no normals; round it off")
     return curve
 
 
 def curve_of_pieces(parameters: Any, rows: Any, closed: bool, what: str) -> Curve:
-    """The curve of coefficients (pieces · order, 3), as files have them."""
+    """Return the curve of coefficients (pieces · order, 3), as files store them."""
     s, c = np.array([] if parameters is None else parameters, float), np.array([] if rows is None else rows, float)
     pieces = len(s) - 1
     if s.ndim != 1 or pieces < 1 or c.ndim != 2 or len(c) % pieces:
@@ -78,12 +83,12 @@ def curve_of_pieces(parameters: Any, rows: Any, closed: bool, what: str) -> Curv
 
 
 def with_normals(curve: Curve, what: str) -> np.ndarray:
-    """Coefficients (pieces, order, 6) of c and of m, a vector across c' that turns about it as little as may be, for the core.
+    """Return coefficients (pieces, order, 6) of c and of m, a vector across c' that turns about it as little as possible, for the core.
 
-    m is the cubic spline through normals of least rotation, of a closed curve with what they are turned by on the way spread evenly.
+    m is the cubic spline through normals of least rotation, for a closed curve with their total turn spread evenly.
     Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, Computation of rotation minimizing frames, ACM Trans. Graphics 27 (2008), by double
     reflection.
-    ModelError where the curve stands still or turns back.
+    ModelError if the curve stands still or turns back.
     """
     s, c = _until(curve.parameters, curve.coefficients, _turns_little, f"{what}: its curve stands still or turns back")
     for _ in range(8):
@@ -99,10 +104,11 @@ def with_normals(curve: Curve, what: str) -> np.ndarray:
     return np.concatenate(padded, axis=2)
 
 
-# ---------------------------------------------------------------------- what a user gives
-def _through(given: Any, s: np.ndarray | None, closed: bool, what: str) -> tuple[np.ndarray, np.ndarray]:
+# ---------------------------------------------------------------------- representations of a user
+def _through(given: Any, s: np.ndarray | None, ends: str, what: str) -> tuple[np.ndarray, np.ndarray]:
     from scipy.interpolate import CubicSpline
 
+    closed = ends == "periodic"
     points = np.array(_core.real_array(given, f"points of {what}"))
     least = 4 if closed else 2
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < least:
@@ -122,7 +128,7 @@ def _through(given: Any, s: np.ndarray | None, closed: bool, what: str) -> tuple
         raise _core.ModelError(f"{what}: {len(points)} points have as many parameters, not {len(s)}")
     try:
         with np.errstate(all="ignore"):
-            return _in_u(s, CubicSpline(s, points, bc_type="periodic" if closed else "natural").c)
+            return _in_u(s, CubicSpline(s, points, bc_type=ends).c)
     except ValueError:  # of slopes that are not finite
         raise _core.ModelError(
             f"{what}: its curve has slopes too large for numbers; points are too far apart, or parameters too close"
@@ -137,7 +143,7 @@ def _of_polynomials(given: Any, what: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fitted(f: Callable[[float], Any], s: np.ndarray, what: str) -> tuple[np.ndarray, np.ndarray]:
-    """f to its rounding by polynomials at Chebyshev's points, pieces halved until the last coefficients are that small."""
+    """Fit f to its rounding by polynomials at Chebyshev's points, halving pieces until the last coefficients are that small."""
     nodes, beside = chebyshev.chebpts1(_DEGREE + 1), np.array([-0.97, 0.05, 0.83])
     fit, there = np.linalg.inv(chebyshev.chebvander(nodes, _DEGREE)), chebyshev.chebvander(beside, _DEGREE)
 
@@ -181,7 +187,7 @@ def _point(f: Callable[[float], Any], s: float, what: str) -> np.ndarray:
 
 # ---------------------------------------------------------------------- pieces
 def _moved(c: np.ndarray, shift: Any, scale: Any) -> np.ndarray:
-    """Coefficients of f(shift + scale u) of those of f (pieces, order, ...)."""
+    """Return coefficients of f(shift + scale u) from those of f (pieces, order, ...)."""
     order = c.shape[1]
     shift, scale = (np.broadcast_to(np.asarray(x, float), len(c)) for x in (shift, scale))
     to = np.zeros((len(c), order, order))
@@ -192,13 +198,13 @@ def _moved(c: np.ndarray, shift: Any, scale: Any) -> np.ndarray:
 
 
 def _in_u(s: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """SciPy's coefficients, of powers of s - s_i, the highest first: those of u, the lowest first."""
+    """Convert SciPy's coefficients, of powers of s - s_i, the highest first, to powers of u, the lowest first."""
     half = np.diff(s) / 2
     return s, _moved(np.swapaxes(c[::-1], 0, 1), half, half)
 
 
 def _split(s: np.ndarray, c: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Those pieces in halves."""
+    """Split these pieces in halves."""
     lower, upper = _moved(c, -0.5, 0.5), _moved(c, 0.5, 0.5)
     pieces = [part for i, halve in enumerate(which) for part in ((lower[i], upper[i]) if halve else (c[i],))]
     middles = [(s[i] + s[i + 1]) / 2 for i in np.flatnonzero(which)]
@@ -229,7 +235,7 @@ def _unit(v: np.ndarray) -> np.ndarray:
 
 
 def _tangents(c: np.ndarray) -> np.ndarray:
-    """At five places of each piece: (pieces, 5, 3), zero where the curve stands still."""
+    """Return tangents at five places of each piece: (pieces, 5, 3), zero where the curve stands still."""
     slopes = np.stack([_valued(_slope(c), u) for u in np.linspace(-1, 1, 5)], axis=1)
     sizes = np.linalg.norm(slopes, axis=2, keepdims=True)
     return np.where(sizes > 1e-3 * sizes.max(axis=1, keepdims=True), slopes / np.where(sizes > 0, sizes, 1.0), 0.0)
@@ -241,13 +247,13 @@ def _turns_little(c: np.ndarray) -> np.ndarray:
 
 
 def _across(c: np.ndarray, m: np.ndarray) -> np.ndarray:
-    """Whether m keeps half of a unit across the tangent all along each piece."""
+    """Check that m keeps half of a unit across the tangent all along each piece."""
     normals = np.stack([_valued(m, u) for u in np.linspace(-1, 1, 5)], axis=1)
     return np.asarray((np.linalg.norm(np.cross(normals, _tangents(c)), axis=2) > 0.5).all(axis=1))
 
 
 def _normals(s: np.ndarray, c: np.ndarray, closed: bool) -> np.ndarray:
-    """m in powers of u, of normals at the ends of the pieces."""
+    """Return m in powers of u, from normals at the ends of the pieces."""
     from scipy.interpolate import CubicSpline
 
     points = np.concatenate([_valued(c, -1.0), _valued(c[-1:], 1.0)])
@@ -269,7 +275,7 @@ def _normals(s: np.ndarray, c: np.ndarray, closed: bool) -> np.ndarray:
 
 
 def _first_normal(t: np.ndarray) -> np.ndarray:
-    """Across the first tangent: of a plane curve the plane's normal, so that it is one all along; else what the curve is least along."""
+    """Return a unit vector across the first tangent: the plane's normal for a plane curve; else the direction least along the curve."""
     axis = np.linalg.svd(t)[2][-1]
     axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
     if abs(axis @ t[0]) > 0.9:

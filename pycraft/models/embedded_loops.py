@@ -1,4 +1,4 @@
-"""The operators of a model with its loops embedded: which bodies, rows and coordinates, and what the core is given of them."""
+"""The operators of a model with embedded loops: their bodies, rows and coordinates, and the data for the core."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from ..arguments import listed
 from ..operators.operator_set import OperatorSet
 from ..state import State, at_state
 
-_RANK = 1e-8  # relative to the longest row of Q, as mobility has it
+_RANK = 1e-8  # relative to the longest row of Q, as in mobility
 
 Set = tuple[list[int], list[int], list[int]]
-"""Of loops that hang together: bodies, rows, dependent coordinates, by number."""
+"""For connected loops: bodies, rows, dependent coordinates, by number."""
 
 
 class EmbeddedOperators(OperatorSet):
     """The operators of a tree whose nodes are the bodies around each loop and single bodies, on independent velocities θ̇_r.
 
-    Letters are those of any tree; beside them ``X_r`` with θ̇ = X_r θ̇_r, block diagonal, Θ_r → Θ, and ``X_r_dot`` along θ̇. docs/loops.md.
+    The letters are those of any tree, and ``X_r`` with θ̇ = X_r θ̇_r, block diagonal, Θ_r → Θ, and ``X_r_dot`` along θ̇. docs/loops.md.
     """
 
     def __init__(self, whole: OperatorSet, sets: list[Set]):
@@ -40,30 +40,30 @@ class EmbeddedOperators(OperatorSet):
 
     @property
     def sets(self) -> list[Set]:
-        """Of loops that hang together: bodies, the rows that are solved, dependent coordinates, by number."""
+        """For each group of connected loops: bodies, the solved rows, dependent coordinates, by number."""
         return [(list(bodies), list(rows), list(dependent)) for bodies, rows, dependent in self._sets]
 
     @property
     def unconstrained(self) -> OperatorSet:
-        """The same groups of bodies with nothing embedded: H = X_r* H_g on the same spaces V and F."""
+        """The same groups of bodies without embedding: H = X_r* H_g on the same spaces V and F."""
         return OperatorSet(self._source.grouped, self._model)
 
     def state(self, q_r: Any, v_r: Any = None, near: Any = None) -> State:
-        """The state on the loops with these independent coordinates, by Newton on the rows from a state nearby, and v = X_r v_r.
+        """Return the state on the loops with these independent coordinates, by Newton on the rows from a state nearby, and v = X_r v_r.
 
-        Nothing drifts: the loops are kept to rounding, however long a motion is.
+        There is no drift: the loops are kept to rounding, however long a motion is.
 
         Parameters
         ----------
-        q_r : their entries of q, in the order of Θ_r; of a hinge with a quaternion all seven or four of its numbers at its first coordinate
-        v_r : (Θ_r,), zero where they are left out
-        near : a q or State the dependent coordinates are sought from; the model's present one where it is left out
+        q_r : their entries of q, in the order of Θ_r; for a hinge with a quaternion all seven or four entries at its first coordinate
+        v_r : (Θ_r,), default: zero
+        near : a q or State from which the dependent coordinates are sought; default: the model's present state
 
         Raises
         ------
         ModelError
-            Where there is none near, with the loops that are left open; numbers that are not as many; a hinge with a quaternion
-            of which single coordinates are independent.
+            No state is near, with the open loops; arrays of the wrong size; a hinge with a quaternion with only some of its coordinates
+            independent.
         """
         model: Any = self._model
         places = self._places()
@@ -79,7 +79,7 @@ class EmbeddedOperators(OperatorSet):
         return State(q, self.X_r.at(q).dense() @ rates)
 
     def _places(self) -> list[int]:
-        """Where the independent coordinates are in q."""
+        """Return the places of the independent coordinates in q."""
         places: list[int] = []
         for i in self.independent:
             hinge = next(h for h in self._model.hinges.values() if h.v_slice.start <= i < h.v_slice.stop)
@@ -89,7 +89,7 @@ class EmbeddedOperators(OperatorSet):
                 continue
             if not set(range(first, last)) <= set(self.independent):
                 raise _core.ModelError(
-                    f"hinge {hinge.name!r} has a rotation of which single coordinates are independent: no numbers say where it is; "
+                    f"hinge {hinge.name!r} has a rotation of which single coordinates are independent: they do not determine it; "
                     "take all of them, independent=, or none"
                 )
             if i == first:
@@ -97,7 +97,7 @@ class EmbeddedOperators(OperatorSet):
         return places
 
     def random_state(self, rng: Any) -> State:
-        """A state on the loops about the present one, where these coordinates are independent."""
+        """Return a state on the loops near the present one, where these coordinates are independent."""
         model: Any = self._model
         X = self.X_r.at(model.q).dense()
         for width in (0.5, 0.2, 0.1, 0.01, 0.0):
@@ -119,7 +119,7 @@ class EmbeddedOperators(OperatorSet):
 
 
 def source_again(model: Any, sets: list[Set]) -> _core.SkoSource:
-    """A source as it was pickled."""
+    """Rebuild a source from its pickle."""
     return _core._embedded(model.soa._source, model.loops._core, sets)
 
 
@@ -127,13 +127,13 @@ def embedded(whole: OperatorSet, independent: Any, q: Any) -> EmbeddedOperators:
     """`OperatorSet.embedded`."""
     model: Any = whole._model
     if model is None or not isinstance(whole._source, _core.MultibodyOperators):
-        raise _core.ModelError(f"loops of {whole._source.name!r} are not embedded: it is no multibody model of its own")
+        raise _core.ModelError(f"loops of {whole._source.name!r} cannot be embedded: it is not a complete multibody model")
     q = _core.real_array(at_state(model, q)[0], "q")
     mobility = model.mobility(q)  # refuses states that are off the loops
     if mobility.singular:
         lost = ", ".join(map(repr, mobility.lost))
         raise _core.ModelError(
-            f"loops of {model.name!r} are singular at this state, where {lost} hang on other rows and do not nearby: "
+            f"loops of {model.name!r} are singular at this state, where {lost} depend on other rows, but not nearby: "
             "embed them at a state beside it, q="
         )
     wanted = _wanted(model, independent)
@@ -146,7 +146,7 @@ def embedded(whole: OperatorSet, independent: Any, q: Any) -> EmbeddedOperators:
 
 
 def _wanted(model: Any, independent: Any) -> list[int] | None:
-    """Numbers of the coordinates that a user wants as independent ones."""
+    """Return the numbers of the coordinates that a user wants as independent."""
     if independent is None:
         return None
     found: list[int] = []
@@ -170,7 +170,7 @@ def _coordinates(source: Any, k: int) -> range:
 
 
 def _bodies_around(model: Any, Q: np.ndarray) -> list[tuple[list[int], list[int]]]:
-    """Bodies and rows of loops that hang together: up to the nearest body that carries all, loops with a body in common taken as one."""
+    """Return bodies and rows of connected loops: up to the nearest body that carries all, merging loops with a body in common."""
     source = model.soa._source
     parents = source.parents
     of_coordinate = [k for k, dof in enumerate(source.dof) for _ in range(dof)]
@@ -191,7 +191,7 @@ def _bodies_around(model: Any, Q: np.ndarray) -> list[tuple[list[int], list[int]
 
 
 def _carried_by_one(bodies: set[int], parents: list[int]) -> set[int]:
-    """These bodies and those between them and the nearest that carries all of them, which is left out."""
+    """Return these bodies and those between them and the nearest common carrier, without the carrier."""
 
     def inboard(k: int) -> list[int]:
         way = []
@@ -206,7 +206,7 @@ def _carried_by_one(bodies: set[int], parents: list[int]) -> set[int]:
 
 
 def _solved(model: Any, Q: np.ndarray, rows: list[int], coordinates: list[int], wanted: list[int] | None) -> tuple[list[int], list[int]]:
-    """The rows that are independent and the coordinates they are solved for, from factors with column pivoting of Q and of its adjoint."""
+    """Return the independent rows and the coordinates for which they are solved, by pivoted factorizations of Q and of its adjoint."""
     from scipy.linalg import qr  # SciPy takes a quarter of a second to import
 
     A = Q[np.ix_(rows, coordinates)]
@@ -226,7 +226,7 @@ def _solved(model: Any, Q: np.ndarray, rows: list[int], coordinates: list[int], 
             given = [names[i] for i in coordinates if i in wanted]
             loops = ", ".join(sorted({repr(model.loops.rows[row].split(":")[0]) for row in rows}))
             raise _core.ModelError(
-                f"independent: around {loops} are {len(coordinates) - rank} coordinate(s), and {given} do not tell where the others are at "
+                f"independent: around {loops} are {len(coordinates) - rank} coordinate(s), and {given} do not determine the others at "
                 f"this state; {good} do"
             )
     dependent = [coordinates[places[j]] for j in order[:rank]]

@@ -1,4 +1,5 @@
-"""Frames: any frame of a model against any other, expressed in any third, and loose frames that are made, moved and removed at run time."""
+"""Frames: any frame of a model relative to any other, expressed in any third, and loose frames that are added, moved and removed at run
+time."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from .coordinates import coordinate_numbers
 from .handles import Body, Node, Vector
 
 Motion = Callable[[float], Any]
-"""A function of time: the pose (4, 4) of a frame on what carries it, or (pose, twist), or (pose, twist, acceleration)."""
+"""A function of time: the pose (4, 4) of a frame on its carrier, or (pose, twist), or (pose, twist, acceleration)."""
 
 AXES = ("body", "aligned", "world")
 KINDS = ("spatial", "classical")
@@ -26,21 +27,21 @@ KINDS = ("spatial", "classical")
 class Frame(Closed):
     """A frame of a model, by its name: `.kind`, `.on`, and its pose, velocity, acceleration and Jacobians relative to any other.
 
-    Arguments that all of these share:
+    Arguments common to all of these:
 
-    wrt : what the frame is seen from: a name, Frame, Body or Node, or None for the base
+    wrt : the reference frame: a name, Frame, Body or Node, or None for the base
     axes : "body" | "aligned" | "world" | a frame
-        The frame's own axes; those of `wrt`; those of `wrt`, of the point of the frame that is at its origin; those of a third frame. Where
-        it is not "world", the linear part is that of the frame's origin. A frame that is called by one of these words is given as `Frame`.
-    q, v, vdot : as direct calls have them, one state or a batch (B, ...), or a `State`
-        Without any, the model's present state: `model.q`, `model.v`, `model.frames.vdot`. Beside an array q, what is left out is zero.
+        The frame's own axes; those of `wrt`; those of `wrt`, for the point of the frame at the origin of `wrt`; those of a third frame.
+        Except for "world", the linear part belongs to the frame's origin. A frame with one of these names is given as `Frame`.
+    q, v, vdot : as in direct calls, one state or a batch (B, ...), or a `State`
+        Without any, the model's present state: `model.q`, `model.v`, `model.frames.vdot`. Beside an array q, omitted ones are zero.
     t : a number, or (B,)
-        The time of frames that a function moves; `model.frames.t` where it is left out.
+        The time of frames that a function moves; default: `model.frames.t`.
     precision : "single" | "double" | "extended" | "quad"
 
-    At the present state results are kept until they are no longer current (docs/frames.md); at given states nothing is kept. Cost: the
-    hinges between the two frames. Raises ModelError for a frame that is unknown (with the nearest name), of another model, or left without
-    what it stood on; EvaluationError for axes and kinds that are not there.
+    At the present state results are cached until they are no longer current (docs/frames.md); at given states nothing is cached. Cost: the
+    hinges between the two frames. Raises ModelError for an unknown frame (with the nearest name), a frame of another model, or one that has
+    lost its carrier; EvaluationError for unknown axes and kinds.
 
     Examples
     --------
@@ -56,7 +57,7 @@ class Frame(Closed):
 
     @property
     def name(self) -> str:
-        """The frame's name in its model; of the base "base"."""
+        """The frame's name in its model; "base" for the base."""
         return self._name or "base"
 
     @property
@@ -79,13 +80,13 @@ class Frame(Closed):
 
     @property
     def on(self) -> Frame | None:
-        """The frame that it stands on: of a body its parent, of the base None."""
+        """The frame that carries it: for a body its parent, for the base None."""
         return None if self.kind == "base" else Frame(self._frames, self._frames._core.carrier(self._name))
 
     # ------------------------------------------------------------------ loose frames
     @property
     def placement(self) -> np.ndarray:
-        """Of a loose frame its pose (4, 4) on what it stands on, now if it is moved. It can be set: then it is fixed."""
+        """The pose (4, 4) of a loose frame on its carrier, at the present time if it is moved. Setting it makes the frame fixed."""
         if self.kind == "moved":
             return self.pose(wrt=self.on)
         return self._frames._core.placement(self._name)
@@ -97,7 +98,7 @@ class Frame(Closed):
 
     @property
     def motion(self) -> Motion | None:
-        """Of a loose frame the function of time that moves it, None of one that is fixed. It can be set (see `add_frame`)."""
+        """The function of time that moves a loose frame, None for a fixed one. It can be set (see `add_frame`)."""
         return self._frames._motions.get(self._name)
 
     @motion.setter
@@ -106,10 +107,10 @@ class Frame(Closed):
         self._frames._motions[self._name] = motion
 
     def attach(self, on: Any = None, *, keep_pose: bool = False) -> None:
-        """Put a loose frame on another frame. Its placement, or its motion, is then the one on that frame.
+        """Put a loose frame on another frame. Its placement, or its motion, is then relative to that frame.
 
-        With keep_pose=True a fixed frame stays where it is at the present state, and its placement is solved for. ModelError for a frame
-        that stands on this one, and for keeping the pose of one that a function moves.
+        With keep_pose=True a fixed frame stays where it is at the present state, and its placement is computed. ModelError for a carrier
+        that stands on this frame, and for keeping the pose of a frame that a function moves.
         """
         on = self._frames._named(on)
         if not switch(keep_pose, "keep_pose"):
@@ -123,15 +124,15 @@ class Frame(Closed):
         self._frames._core.place(self._name, held[:3, :3], held[:3, 3])
 
     def remove(self) -> None:
-        """Remove a loose frame. ModelError where others stand on it."""
+        """Remove a loose frame. ModelError if others stand on it."""
         self._frames._core.remove(self._name)
         self._frames._motions.pop(self._name, None)
 
-    # ------------------------------------------------------------------ motions
+    # ------------------------------------------------------------------ motion
     def pose(self, q=None, *, wrt: Any = None, axes: Any = None, t: Any = None, precision: str = "double") -> np.ndarray:
-        """X (4, 4) or (B, 4, 4): the frame's axes as columns and its origin (m), seen from that of `wrt`, in the axes of `wrt`.
+        """Return X (4, 4) or (B, 4, 4): the frame's axes as columns and its origin (m), relative to `wrt`, in the axes of `wrt`.
 
-        axes : a frame in whose axes both are instead
+        axes : another frame in whose axes both are expressed
 
         Examples
         --------
@@ -149,7 +150,8 @@ class Frame(Closed):
         return core.pose_at(self._name, other, self._state(q)[0], self._time(t), precision)
 
     def velocity(self, q=None, v=None, *, wrt: Any = None, axes: Any = "body", t: Any = None, precision: str = "double") -> np.ndarray:
-        """The twist V = (ω; v) relative to `wrt`, (6,) or (B, 6), rad/s and m/s: of X = pose(wrt), (X⁻¹Ẋ)^∨ in the frame's own axes."""
+        """Return the twist V = (ω; v) relative to `wrt`, (6,) or (B, 6), rad/s and m/s: for X = pose(wrt), (X⁻¹Ẋ)^∨ in the frame's own
+        axes."""
         core, other, (axes, third) = self._frames._core, self._frames._named(wrt), self._axes(axes)
         if self._present(q, v, None, t, precision):
             return core.motion(self._name, other, axes, third, None)
@@ -160,11 +162,11 @@ class Frame(Closed):
         self, q=None, v=None, vdot=None, *, wrt: Any = None, axes: Any = "body", kind: str = "spatial", t: Any = None,
         precision: str = "double",
     ) -> np.ndarray:  # fmt: skip
-        """The acceleration relative to `wrt`, (6,) or (B, 6), rad/s² and m/s².
+        """Return the acceleration relative to `wrt`, (6,) or (B, 6), rad/s² and m/s².
 
         kind : "spatial" or "classical"
-            V̇, the rate of the six numbers of V in the frame's own axes; or (ω̇; p̈), with the acceleration of the point v̇ + ω × v. Either is
-            then expressed in the axes that are asked for. Neither holds anything of how `wrt` itself moves.
+            V̇, the rate of the six components of V in the frame's own axes; or (ω̇; p̈), with the acceleration of the point v̇ + ω × v.
+            Both are then expressed in the requested axes. Neither depends on how `wrt` itself moves.
         """
         core, other, (axes, third) = self._frames._core, self._frames._named(wrt), self._axes(axes)
         if not isinstance(kind, str) or kind not in KINDS:
@@ -177,7 +179,8 @@ class Frame(Closed):
     def bias_acceleration(
         self, q=None, v=None, *, wrt: Any = None, axes: Any = "body", kind: str = "spatial", t: Any = None, precision: str = "double"
     ) -> np.ndarray:
-        """The acceleration at v̇ = 0, (6,) or (B, 6): J̇v, and what functions of time add. In "aligned" axes J̇v is the classical one."""
+        """Return the acceleration at v̇ = 0, (6,) or (B, 6): J̇v, plus terms of functions of time. In "aligned" axes J̇v is the classical
+        one."""
         q, v, _ = self._state(q, v)
         return self.acceleration(q, v, np.zeros(self._model.nv), wrt=wrt, axes=axes, kind=kind, t=t, precision=precision)
 
@@ -185,10 +188,11 @@ class Frame(Closed):
     def jacobian(
         self, q=None, *, wrt: Any = None, axes: Any = "body", coordinates: Any = None, t: Any = None, precision: str = "double"
     ) -> np.ndarray:
-        """J (6, n) or (B, 6, n): velocity = J v, and what functions of time add. Exact zeros for what moves both frames or neither.
+        """Return J (6, n) or (B, 6, n): velocity = J v, plus terms of functions of time. Coordinates that move both frames or neither give
+        exact zeros.
 
         coordinates : names or numbers, or a list of them
-            Of hinges (all of their coordinates), or of single coordinates, in the order of the columns; all of the model's by default.
+            Hinges (all of their coordinates), or single coordinates, in the order of the columns; default: all of the model's.
 
         Examples
         --------
@@ -201,22 +205,23 @@ class Frame(Closed):
     def jacobian_dot(
         self, q=None, v=None, *, wrt: Any = None, axes: Any = "body", coordinates: Any = None, t: Any = None, precision: str = "double"
     ) -> np.ndarray:
-        """J̇ (6, n) or (B, 6, n): the rate of the numbers of `jacobian` along v, and t, in the same axes, which may turn."""
+        """Return J̇ (6, n) or (B, 6, n): the rate of the entries of `jacobian` along v, and t, in the same axes, which may turn."""
         q, v, _ = self._state(q, v)
         return self._jacobian(q, v, wrt, axes, coordinates, t, precision)
 
     def jacobian_operator(self, *, wrt: Any = None, axes: Any = "body", coordinates: Any = None) -> _core.Operator:
-        """`jacobian` as an expression, Θ → R⁶ (or from the coordinates that are named): `.at(q)`, `.diff(i)`, `.dot()` for J̇, products.
+        """Return `jacobian` as an expression, Θ → R⁶ (or from the named coordinates): `.at(q)`, `.diff(i)`, `.dot()` for J̇, products.
 
-        Made of the letters 𝒥 = B*φ*H* and X = φ(0,k) and of constants, so that every rule of the algebra holds for it; zeros of what moves
-        both frames are zeros to rounding. O(N). ModelError where a frame is moved by a function of time: operators know of no time.
+        Built of the letters 𝒥 = B*φ*H* and X = φ(0,k) and of constants, so that every rule of the algebra holds for it; columns of
+        coordinates that move both frames are zero to rounding. O(N). ModelError for frames that a function of time moves: operators do not
+        depend on time.
         """
         axes, third = self._axes(axes)
         names = {"frame": self._name, "wrt": self._frames._named(wrt), "axes": third if axes == "other" else None}
         anchors = {role: None if name is None else self._frames._anchor(name) for role, name in names.items()}
         return relative_jacobian(self._model, anchors, axes, coordinate_numbers(self._model, coordinates))
 
-    # ------------------------------------------------------------------ what they share
+    # ------------------------------------------------------------------ common parts
     def _jacobian(self, q, v, wrt, axes, coordinates, t, precision) -> np.ndarray:
         axes, third = self._axes(axes)
         chosen = coordinate_numbers(self._model, coordinates)
@@ -228,7 +233,7 @@ class Frame(Closed):
     def _state(self, q=None, v=None, vdot=None) -> tuple[Any, Any, Any]:
         if isinstance(q, (str, Frame, Body, Node)):
             seen_from = getattr(q, "name", q)
-            raise _core.ModelError(f"the frame that {self.name!r} is seen from is given as wrt={seen_from!r}; first come states")
+            raise _core.ModelError(f"the reference frame of {self.name!r} is given as wrt={seen_from!r}; first come states")
         if vdot is None:
             vdot = self._frames.vdot if q is None else np.zeros(self._model.nv)
         return *at_state(self._model, q, v), vdot
@@ -237,7 +242,7 @@ class Frame(Closed):
         return self._frames.t if t is None else t
 
     def _axes(self, axes: Any) -> tuple[str, str]:
-        """As the core has them: which, and whose."""
+        """Return the axes in the form that the core expects: which, and whose."""
         if isinstance(axes, str) and axes in AXES:
             return axes, ""
         if isinstance(axes, str):
@@ -252,7 +257,7 @@ class Frame(Closed):
         try:
             on = self.on
         except _core.ModelError:
-            return f"<frame {self.name!r}: not there, or left without what it stood on>"
+            return f"<frame {self.name!r}: missing, or without its carrier>"
         return f"<frame {self.name!r}: {self.kind}{'' if on is None else f' on {on.name!r}'}>"
 
 
@@ -277,7 +282,7 @@ class Frames(Closed, Mapping):
 
     @property
     def t(self) -> float:
-        """The present time (s) of frames that a function moves; zero until it is set."""
+        """The present time (s) of frames that a function moves; initially zero."""
         return self._core.time
 
     @t.setter
@@ -286,7 +291,7 @@ class Frames(Closed, Mapping):
 
     @property
     def vdot(self) -> np.ndarray:
-        """The present accelerations (nv,), zero until they are set; carried over by hinge name when the structure changes."""
+        """The present accelerations (nv,), initially zero; carried over by hinge name when the structure changes."""
         return self._core.accelerations
 
     @vdot.setter
@@ -295,7 +300,7 @@ class Frames(Closed, Mapping):
 
     @property
     def computed(self) -> dict[str, int]:
-        """What was computed at present states so far: "poses", "velocities", "accelerations" of single steps (a hinge, a moved frame), and
+        """Counts of computations at present states: "poses", "velocities", "accelerations" of single steps (a hinge, a moved frame), and
         "pairs", motions of one frame relative to another."""
         return dict(zip(("poses", "velocities", "accelerations", "pairs"), self._core.counts(), strict=True))
 
@@ -309,10 +314,10 @@ class Frames(Closed, Mapping):
         placement: np.ndarray | None = None,
         motion: Motion | None = None,
     ) -> Frame:
-        """A new loose frame: see `Multibody.add_frame`."""
+        """Add a loose frame: see `Multibody.add_frame`."""
         name, on = text(name, "a frame"), self._named(on)
         if motion is not None and not (position is rotation is placement is None):
-            raise _core.ModelError(f"frame {name!r}: give a pose, or a motion, which gives poses, not both")
+            raise _core.ModelError(f"frame {name!r}: give a pose, or a motion that returns poses, not both")
         rotation, position = pose_parts(f"frame {name!r}", rotation, position, placement)
         self._core.add(name, on, rotation, position, None if motion is None else _function(motion, name))
         if motion is not None:
@@ -320,7 +325,7 @@ class Frames(Closed, Mapping):
         return Frame(self, name)
 
     def remove(self, name: str | Frame) -> None:
-        """Remove a loose frame. ModelError where others stand on it."""
+        """Remove a loose frame. ModelError if others stand on it."""
         Frame(self, self._named(name)).remove()
 
     def __getitem__(self, name: Any) -> Frame:
@@ -348,9 +353,9 @@ class Frames(Closed, Mapping):
     def __repr__(self) -> str:
         return f"<frames of {self._model.name!r}: {len(self)}, {len(self._core.loose_names())} of them loose>"
 
-    # ------------------------------------------------------------------ for frames
+    # ------------------------------------------------------------------ for its frames
     def _named(self, frame: Any) -> str:
-        """The name of a frame of this model, "" of the base. Whether there is one, the core looks."""
+        """Return the name of a frame of this model, "" for the base. The core checks that it exists."""
         if isinstance(frame, (Frame, Body, Node)):
             if frame._model is not self._model:
                 own, other = self._model.name, frame._model.name
@@ -359,19 +364,19 @@ class Frames(Closed, Mapping):
         return name_of(frame, "a frame", "")
 
     def _anchor(self, name: str) -> tuple[str | None, np.ndarray]:
-        """The body that a frame stands on, None for the base, and its pose (4, 4) there."""
+        """Return the body that carries a frame, None for the base, and its pose (4, 4) there."""
         X = np.eye(4)
         frame = Frame(self, name)
         while (kind := frame.kind) not in ("body", "base"):
             if kind == "moved":
-                what = "is moved by a function of time, and operators know of no time; ask for arrays"
+                what = "is moved by a function of time, and operators do not depend on time; compute arrays instead"
                 raise _core.ModelError(f"frame {frame.name!r} {what}")
             placed = frame.placement if kind == "fixed" else frame.pose(wrt=frame.on)
             X, frame = placed @ X, frame.on  # type: ignore[assignment]  # the base ends it
         return (None if kind == "base" else frame.name), X
 
     def _add_again(self, loose: Mapping[str, Any]) -> None:
-        """Make a frame that `_description` tells of."""
+        """Add a frame from its `_description`."""
         moved = {"motion": loose["motion"]} if loose.get("motion") is not None else {"placement": loose["placement"]}
         try:
             self.add(loose["name"], loose["on"] or None, **moved)
@@ -379,7 +384,7 @@ class Frames(Closed, Mapping):
             raise _core.ModelError(f"frame {loose['name']!r} is not copied: {error}; attach it to another frame, or remove it") from None
 
     def _description(self) -> list[dict[str, Any]]:
-        """The loose frames as plain data, each after what it stands on."""
+        """Return the loose frames as plain data, each after its carrier."""
         waiting: dict[str, dict[str, Any]] = {
             name: {"name": name, "on": self._core.on(name), "placement": self._core.placement(name), "motion": self._motions.get(name)}
             for name in self._core.loose_names()

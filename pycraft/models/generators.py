@@ -1,4 +1,4 @@
-"""Models made by rule: the uniform chain, random trees."""
+"""Generated models: the uniform chain, random trees."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..arguments import LARGEST, listed, name_of, one_number, parents_of, seed_o
 from .multibody import Multibody
 
 _CUSTOM = ("pin", "slider", "pin")
-"""Subhinges of the custom hinges that are made here."""
+"""Subhinges of the custom hinges that are generated here."""
 
 
 def chain(
@@ -25,10 +25,10 @@ def chain(
     welds: str = "lump",
     name: str | None = None,
 ) -> Multibody:
-    """A serial chain of n bodies.
+    """Return a serial chain of n bodies.
 
-    With `seed=None`: uniform thin rods of 1 kg and 1 m along x, all axes z, so that everything has a closed form. With a seed: poses,
-    axes and positive definite inertias drawn from it.
+    With `seed=None`: uniform thin rods of 1 kg and 1 m along x, all axes z, so that everything has a closed form. With a seed: random
+    poses, axes and positive definite inertias.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def chain(
     model = Multibody(name_of(name, "a model", f"chain of {n} rods"), welds=welds)
     mass, length = one_number(mass, "mass of a rod"), one_number(length, "length of a rod")
     if not abs(length) < 1e150:
-        raise _core.ModelError(f"length of a rod: {length:g} m, whose square is no number")
+        raise _core.ModelError(f"length of a rod: {length:g} m; its square overflows")
     rod: dict[str, Any] = dict(mass=mass, com=(length / 2, 0, 0), inertia=np.diag([0.0, mass * length**2 / 12, mass * length**2 / 12]))
     for k in range(n):
         options: dict[str, Any] = {}
@@ -73,7 +73,7 @@ def tree(
     welds: str = "lump",
     name: str | None = None,
 ) -> Multibody:
-    """A random tree: `parents[k] < k`, -1 for the base; poses, axes and positive definite inertias drawn from the seed.
+    """Return a random tree: `parents[k] < k`, -1 for the base; poses, axes and positive definite inertias drawn from the seed.
 
     Bodies are named "body0", "body1", ... and hinges "hinge0", ... by their index in `parents`; the model keeps them depth first. A
     "custom" hinge here is pin, slider, pin. With `rotor_inertia` every coordinate has one. Bodies on welds are lumped into the bodies that
@@ -110,12 +110,12 @@ def tree(
 
 
 def _subhinges(kind: str) -> tuple[str, ...]:
-    """The kinds of a hinge's subhinges; none for a name that is no kind."""
+    """Return the kinds of a hinge's subhinges; none for an unknown name."""
     return _CUSTOM if kind == "custom" else _core.hinge_kinds[kind].subhinges if kind in _core.hinge_kinds else ()
 
 
 def _random_options(kind: str, rng: np.random.Generator) -> dict[str, Any]:
-    """Axes, point and pitch, as far as the kind has them."""
+    """Return random axes, point and pitch, if the kind has them."""
     if kind == "custom":
         return {"subhinges": [{"kind": s, "axis": _axis(rng), "point": rng.uniform(-0.2, 0.2, 3)} for s in _CUSTOM]}
     subhinges = [_core.subhinge_kinds[s] for s in _subhinges(kind)]
@@ -138,7 +138,7 @@ def _axis(rng: np.random.Generator) -> np.ndarray:
 
 
 def _orthogonal(rng: np.random.Generator) -> np.ndarray:
-    """A rotation matrix, uniform on the group."""
+    """Return a rotation matrix, uniform on the group."""
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     if np.linalg.det(q) < 0:

@@ -1,4 +1,4 @@
-"""Branches of a model: removed with what is on them, copied, and taken from another model."""
+"""Branches of a model: removed with everything on them, copied, and merged from another model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .with_loops import WithLoops
 
 
 class Removed(NamedTuple):
-    """Names of what was removed. `effects` are pairs of a scene and the name of an effect that was taken out of it."""
+    """Names of the removed items. `effects` are pairs of a scene and the name of an effect removed from it."""
 
     bodies: list[str]
     hinges: list[str]
@@ -29,7 +29,7 @@ class Removed(NamedTuple):
 
 
 class Grafting(WithLoops):
-    """Edits that take bodies off and put bodies on. Each leaves the model as it was where it is refused; operators and parts are stale."""
+    """Edits that remove and add bodies. Each leaves the model unchanged if it is refused; operators and parts become stale."""
 
     _left_aside: dict[str, np.ndarray]
     _actuators: list[dict[str, Any]]
@@ -41,19 +41,19 @@ class Grafting(WithLoops):
     def remove_body(self, name: str | Body, *, with_uses: bool = False) -> Removed:
         """Remove a body with everything outboard of it. Operators made before are stale; q and v are carried over by hinge name.
 
-        Welded links of the model's file that are nodes of these bodies go along. Nodes that were added here (`add_node`), and loops and
-        effects of scenes of this model that name one of the bodies, hinges or nodes, are uses of them. Loose frames that stand on them
-        stay, and say so when they are asked (docs/frames.md).
+        Welded links of the model's file that are nodes of these bodies are removed with them. Nodes added by `add_node`, and loops and
+        effects of scenes of this model that name one of the bodies, hinges or nodes, count as uses. Loose frames that stand on them stay,
+        and report it when they are evaluated (docs/frames.md).
 
         Parameters
         ----------
-        name : of the body, or its handle
-        with_uses : whether what uses them goes along, nodes, loops and effects; else a body in use is refused
+        name : name of the body, or its handle
+        with_uses : whether to remove its uses as well, nodes, loops and effects; else a body in use is refused
 
         Raises
         ------
         ModelError
-            A body that is in use: says by what.
+            A body that is in use: names the uses.
 
         Cost: O(bodies), and the effects of the model's scenes.
 
@@ -106,18 +106,18 @@ class Grafting(WithLoops):
         rotation: np.ndarray | None = None,
         placement: np.ndarray | None = None,
     ) -> Body:
-        """A copy of a body with everything outboard of it, hung on another body by a copy of its hinge.
+        """Copy a body with everything outboard of it, to another body by a copy of its hinge.
 
-        Bodies, hinges with their limits and rotors, nodes, loose frames that stand on them, loops among them, and what the model's file
-        said of their coordinates are copied. So is the state: the copy stands and moves against its parent as the original does now.
+        Bodies, hinges with their limits and rotors, nodes, loose frames that stand on them, loops among them, and the file's data on their
+        coordinates are copied. So is the state: the copy has the same position and velocity relative to its parent as the original has now.
 
         Parameters
         ----------
-        body : by its name or handle
+        body : its name or handle
         parent : name of a body or node, a Body or Node, or None for the base
-        prefix, suffix : before and after the names of all that is copied
-        rename : function of a name, in their place
-        position, rotation, or placement : the pose of the copied hinge's inboard frame on the parent; as of the original where left out
+        prefix, suffix : before and after all copied names
+        rename : function of a name, used in their place
+        position, rotation, or placement : the pose of the copied hinge's inboard frame on the parent; default: as in the original
 
         Returns
         -------
@@ -126,7 +126,7 @@ class Grafting(WithLoops):
         Raises
         ------
         ModelError
-            Names that are taken, all of them, and the remedy; an unknown parent, a pose that is none.
+            Names that exist already, all of them, and the remedy; an unknown parent, an invalid pose.
 
         Cost: O(bodies), in the core.
 
@@ -158,26 +158,26 @@ class Grafting(WithLoops):
         rotation: np.ndarray | None = None,
         placement: np.ndarray | None = None,
     ) -> list[Body]:
-        """Take in all of another model, its base put on a body of this one. The other model stays as it is.
+        """Copy all of another model into this one, its base put on a body of this one. The other model does not change.
 
-        Bodies, hinges with their limits and rotors, nodes (those on its base, too), loose frames, loops, what its file said of its
-        coordinates, and its present state are copied; its gravity is not, this model has its own.
+        Bodies, hinges with their limits and rotors, nodes (including those on its base), loose frames, loops, the file's data on its
+        coordinates, and its present state are copied; its gravity is not.
 
         Parameters
         ----------
         other : a model, or a part of one
         parent : name of a body or node, a Body or Node, or None for the base
-        prefix, suffix, rename : what its names are called here, as of `copy_subtree`
+        prefix, suffix, rename : for its names here, as in `copy_subtree`
         position, rotation, or placement : the pose of the other model's base on the parent
 
         Returns
         -------
-        list of Body : those that hung on the other model's base
+        list of Body : the bodies on the other model's base
 
         Raises
         ------
         ModelError
-            As of `copy_subtree`; of the other model's base, where that is put elsewhere: a loose frame that a function moves, a loop.
+            As `copy_subtree`; also for a loose frame that a function moves, or a loop, on the other model's base if that is moved.
 
         Cost: O(bodies of both), in the core.
 
@@ -199,9 +199,9 @@ class Grafting(WithLoops):
         self._take(other, -1, frame_name(parent), rotation, position, False, called)
         return [Body(self, called(root)) for root in roots]
 
-    # ------------------------------------------------------------------ how
+    # ------------------------------------------------------------------ implementation
     def _used_by(self, scene: Any) -> None:
-        """A scene acts on the model, as long as somebody has it."""
+        """Register a scene that acts on the model, as long as it exists."""
         if self._scenes is None:
             self._scenes = WeakSet()
         self._scenes.add(scene)
@@ -209,18 +209,18 @@ class Grafting(WithLoops):
     def _take(
         self, source: Any, root: int, parent: str, rotation: Any, position: Any, places_hinge: bool, called: Callable[[str], str]
     ) -> None:
-        """Copies of a branch of a model, root -1: of all, and of what stands on it."""
+        """Copy a branch of a model, root -1 for the whole, with everything that stands on it."""
         bodies, hinges, nodes = source._branch(root)
         frames = _frames_on(source, {*bodies, *nodes}, root < 0)
         for moved in frames if root < 0 else ():
             if not moved["on"] and moved["motion"] is not None and (parent or rotation is not None or position is not None):
-                what = f"frame {moved['name']!r} is moved by a function of time, which says where it is on the base of {source.name!r}"
+                what = f"frame {moved['name']!r} is moved by a function of time, which places it on the base of {source.name!r}"
                 raise _core.ModelError(f"{what}: put it on a node there first")
         new_bodies, new_hinges, new_nodes = ([_called(called, name) for name in names] for names in (bodies, hinges, nodes))
         loops = _loops_on(source, {*bodies, *hinges, *nodes}, root < 0)
         for loop in loops if parent or rotation is not None or position is not None else ():
             if "" in source.loops._stands_on(loop["name"]):
-                what = f"loop {loop['name']!r} is closed at the base of {source.name!r}, which is put elsewhere here"
+                what = f"loop {loop['name']!r} is closed at the base of {source.name!r}, which is placed elsewhere here"
                 raise _core.ModelError(f"{what}: declare it on a node there first")
         made = [frame | {"name": _called(called, frame["name"])} for frame in frames]
         closed = [_renamed(loop, called) for loop in loops]
@@ -233,7 +233,7 @@ class Grafting(WithLoops):
         own, its = Asides(self), Asides(source)
         added = set(map(called, set(nodes) & getattr(source, "_added_nodes", set())))
         self._graft(source, root, parent, rotation, position, places_hinge, new_bodies, new_hinges, new_nodes)
-        X = _placed(rotation, position)  # as they were checked there
+        X = _placed(rotation, position)  # checked there
         self._added_nodes |= added
         copies = {frame["name"] for frame in frames} | {*bodies, *nodes}
         for frame in made:
@@ -248,7 +248,7 @@ class Grafting(WithLoops):
 
 
 def _frames_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str, Any]]:
-    """Loose frames that stand on these, or on one another there, each after what it stands on; of the base by its name ""."""
+    """Return loose frames that stand on these, or on one another there, each after its carrier; "" names the base."""
     found, names, kept = [], set(carriers), model._kept_frames
     for frame in [] if kept is None else kept._description():
         on_base = not frame["on"] or (frame["on"] in ("base", "world") and kept._core.number(frame["on"]) == -1)
@@ -259,25 +259,25 @@ def _frames_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str
 
 
 def _loops_on(model: Any, carriers: set[str], with_base: bool) -> list[dict[str, Any]]:
-    """Loops that are declared on these alone, and on the base, "", where that is among them."""
+    """Return loops that are declared on these alone, and on the base, "", if it is among them."""
     kept = model._kept_loops
     grounds = carriers | {""} if with_base else carriers
     return [] if kept is None else [loop for loop in kept._description() if kept._stands_on(loop["name"]) <= grounds]
 
 
 def _renamed(loop: dict[str, Any], called: Callable[[str], str]) -> dict[str, Any]:
-    """A loop of things that are called otherwise."""
+    """Return a loop with renamed parts."""
     on = lambda name: called(name) if name else ""
     if "terms" in loop:
         where: dict[str, Any] = {"terms": [(on(hinge), *rest) for hinge, *rest in loop["terms"]]}
     else:
         where = {"a": on(loop["a"]), "b": on(loop["b"])}
-    own = {key: part for key, part in loop.items() if key not in ("whole", "held")}  # what is locked there is a weld here
+    own = {key: part for key, part in loop.items() if key not in ("whole", "held")}  # hinges locked there are welds here
     return own | where | {"name": _called(called, loop["name"])}
 
 
 def roots_of(model: Any) -> list[int]:
-    """Numbers of the bodies on the base: depth first, what each carries is a run."""
+    """Return the numbers of the bodies on the base: in depth-first order the bodies of each branch are consecutive."""
     roots, k = [], 0
     while k < model._size:
         roots.append(k)

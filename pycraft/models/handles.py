@@ -1,4 +1,4 @@
-"""Handles of a model's bodies, hinges and nodes: values that are read and set, and parameters to differentiate along."""
+"""Handles of a model's bodies, hinges and nodes: values that can be read and set, and parameters to differentiate along."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TWIST = ("rx", "ry", "rz", "x", "y", "z")
 
 
 def _component(i: int | str, names: Sequence[str] = ("x", "y", "z")) -> int:
-    """The number of a component given by its name or number."""
+    """Return the number of a component given by its name or number."""
     if isinstance(i, str) and i in names:
         return list(names).index(i)
     if isinstance(i, (int, np.integer)) and -len(names) <= i < len(names):
@@ -27,7 +27,7 @@ def _component(i: int | str, names: Sequence[str] = ("x", "y", "z")) -> int:
 
 
 def _source(model: WithOperators) -> _core.MultibodyOperators:
-    """Whose parameters they are: the model's operators as the core has them."""
+    """Return the model's operators in the core, which own the parameters."""
     source = model.soa._source
     assert isinstance(source, _core.MultibodyOperators)
     return source
@@ -84,7 +84,7 @@ class Body(Closed):
         return Hinge(self._model, self._data()["hinge"]["name"])
 
     def symbol(self, name: str, i: int | str = 0, j: int | str | None = None) -> _core.Parameter:
-        """A mass property as what `diff` takes: "mass"; "com" with a component i; "inertia" with an entry (i, j), the symmetric one along.
+        """Return a mass property as an argument of `diff`: "mass"; "com" with a component i; "inertia" with an entry (i, j) and its mirror.
 
         Components are numbers 0, 1, 2 or "x", "y", "z", in the body's axes; the inertia is about the centre of mass.
         """
@@ -155,7 +155,7 @@ class Hinge(Closed):
 
     @property
     def rotor_inertia(self) -> np.ndarray:
-        """Inertia that a rotor adds along each coordinate, reflected through its gear (kg m² or kg): the block J(k)."""
+        """Inertia of a rotor along each coordinate, reflected through its gear (kg m² or kg): the block J(k)."""
         return read_only(self._data()["rotor_inertia"])
 
     @rotor_inertia.setter
@@ -163,7 +163,7 @@ class Hinge(Closed):
         self._model._set_rotor_inertia(self._index(), value)
 
     def symbol(self, name: str, component: int | str = 0, subhinge: int = 0) -> _core.Parameter:
-        """A parameter of the hinge as what `diff` takes.
+        """Return a parameter of the hinge as an argument of `diff`.
 
         "placement": the hinge's inboard frame moved by a unit twist on its own side, components "rx", "ry", "rz", "x", "y", "z" (or 0
         to 5), radians or metres; "axis": a subhinge's axis turned about component x, y or z of the axes before it, its point held;
@@ -253,9 +253,9 @@ class Named(Mapping):
 
     def __getitem__(self, name: object) -> Any:
         if not isinstance(name, str):
-            raise KeyError(f"by name, not by {name!r}")
+            raise KeyError(f"the key is a name, not {name!r}")
         try:
-            self._find(text(name, "what is asked for"))  # raises with the names there are
+            self._find(text(name, "what is asked for"))  # its error lists the known names
         except _core.ModelError as error:
             raise KeyError(str(error)) from None
         return self._make(name)

@@ -1,6 +1,6 @@
-"""Couplings of which some hinges are locked: they hold the others, by what the locked coordinates are (docs/locking.md).
+"""Couplings with some locked hinges: they constrain the others, with the locked coordinates constant (docs/locking.md).
 
-Of constant + Σ P_i(q_i) the terms of locked coordinates are numbers, and go into the constant; a function is called with them as they are.
+In constant + Σ P_i(q_i) the terms of locked coordinates are added to the constant; a function is called with their values.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .. import _core
 
 
 class PartlyHeld:
-    """The function of a coupling of n coordinates with some of them held, of the others alone; it pickles where the function does."""
+    """The function of a coupling of n coordinates with some of them held, of the others alone; it pickles if the function does."""
 
     def __init__(self, function: Any, count: int, held: Mapping[int, float]):
         self._function, self._count, self._held = function, count, dict(held)
@@ -29,10 +29,10 @@ class PartlyHeld:
 
 
 def with_held(declared: Mapping[str, Any], held: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """A coupling as it is declared where the coordinates of these hinges, by name, are locked at these values.
+    """Return a coupling as it is declared with the coordinates of these hinges, by name, locked at these values.
 
-    What it was before is under "whole", and who holds it under "held". ModelError where none of its coordinates is left, or none that it
-    holds by.
+    "whole" holds its earlier form, and "held" the locked hinges. ModelError if none of its coordinates is left, or none that it can
+    constrain.
     """
     whole = dict(declared.get("whole", declared))
     held = {hinge: q for hinge, q in held.items() if any(hinge == own for own, *_ in whole["terms"])}
@@ -48,8 +48,7 @@ def with_held(declared: Mapping[str, Any], held: Mapping[str, np.ndarray]) -> di
     if not terms or function is None and not any(np.any(np.asarray(own)[1:]) for *_, own in terms):
         names = ", ".join(map(repr, dict.fromkeys(hinge for hinge, *_ in whole["terms"])))
         raise _core.ModelError(
-            f"coupling {whole['name']!r} would have no coordinate left to hold, of {names}: lock fewer of them, as it holds the others, or "
-            "remove it first"
+            f"coupling {whole['name']!r} would have no free coordinate left, of {names}: lock fewer of them, or remove it first"
         )
     held_now = {hinge: np.array(q, float) for hinge, q in held.items()}
     return whole | {"terms": terms, "constant": constant, "function": function, "whole": whole, "held": held_now}

@@ -1,4 +1,4 @@
-"""A hinge as users give it, taken apart before the core checks the numbers: of bodies that are added, or hung elsewhere."""
+"""Read a hinge as users give it, before the core checks the values: for bodies that are added, or moved to another parent."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def hinge_arguments(
     rotor_inertia: float | Vector | None = None,
     limits: tuple[float | Vector, float | Vector] | None = None,
 ) -> dict[str, Any]:
-    """The arguments of a hinge as the core has them, by its names. `what` it belongs to, for errors: "body 'hand'".
+    """Return the arguments of a hinge by the core's names. `what`: the owner, for errors, such as "body 'hand'".
 
-    ModelError where arguments exclude one another or are of another kind of hinge.
+    ModelError for arguments that exclude one another or belong to another kind of hinge.
     """
     hinge = text(hinge, "the kind of a hinge")
     directions = hinge_axes(what, hinge, axis, axes, point, subhinges)
@@ -50,12 +50,12 @@ def hinge_arguments(
 
 
 def frame_name(frame: str | Body | Node | None) -> str:
-    """The name of the body or node that something is put on; empty for the base."""
+    """Return the name of the body or node of a placement; empty for the base."""
     if frame is None:
         return ""
     return frame.name if isinstance(frame, (Body, Node)) else text(frame, "a parent")
 
 
 def body_name(body: str | Body) -> str:
-    """The name of a body that is given by it or by its handle."""
+    """Return the name of a body that is given by name or handle."""
     return body.name if isinstance(body, Body) else text(body, "a body")

@@ -1,4 +1,4 @@
-"""The axes of a hinge as a user gives them, of bodies and of loops."""
+"""The axes of a hinge as a user gives them, for bodies and loops."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def hinge_axes(
     point: Vector | None,
     subhinges: Sequence[Mapping[str, Any]] | None,
 ) -> list[Any]:
-    """The axes of a hinge of this kind, by default along z. `what` it belongs to, for errors.
+    """Return the axes of a hinge of this kind, default: along z. `what`: the owner, for errors.
 
-    ModelError for axis and axes at once, and for a custom hinge that is not given by its subhinges alone.
+    ModelError for axis and axes at once, and for a custom hinge with anything but its subhinges.
     """
     if axis is not None and axes is not None:
         raise _core.ModelError(f"{what}: give axis or axes, not both")
     if subhinges is not None and hinge != "custom":
         raise _core.ModelError(f"{what}: subhinges belong to a hinge of kind 'custom', not {hinge!r}")
     if hinge == "custom" and (subhinges is None or not (axis is axes is point is None)):
-        raise _core.ModelError(f"{what}: a custom hinge takes subhinges=[...], each with its kind, axis and point, and nothing beside")
+        raise _core.ModelError(f"{what}: a custom hinge takes subhinges=[...], each with its kind, axis and point, and nothing else")
     return listed([axis] if axis is not None else axes if axes is not None else _DEFAULT_AXES.get(hinge, ()), f"axes of {what}")

@@ -1,4 +1,4 @@
-"""Coordinates and velocities of a hinge at which a body is where it is and moves as it moves: one iteration for all kinds."""
+"""Fit coordinates and velocities of a hinge to the pose and velocity of a body: one iteration for all kinds."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from ..state import random_state
 from .parts import _quaternions
 
 STARTS = 12
-"""Random configurations that are started from where the one that was given leads nowhere."""
+"""Number of random starts if the given configuration leads nowhere."""
 STEPS = 60
 HALVINGS = 12
 ROUNDING = 1e-14
-"""Of products of a few poses: what is nearer is there."""
+"""Rounding of products of a few poses: a smaller error counts as reached."""
 
 
 @dataclass(frozen=True)
 class HingeFit:
-    """What a hinge can do of a pose X and a twist V of its body relative to its inboard side.
+    """The part of a pose X and a twist V of a body relative to its inboard side that its hinge can produce.
 
     Attributes
     ----------
     q, v : coordinates and velocities of the hinge
-    pose_error, velocity_error : (6,), what remains of X and V, twists in the body's axes: rad and m, rad/s and m/s
+    pose_error, velocity_error : (6,), the remainders of X and V, twists in the body's axes: rad and m, rad/s and m/s
     """
 
     q: np.ndarray
@@ -38,16 +38,16 @@ class HingeFit:
 
 
 def twist_between(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
-    """The twist ξ with Y = X exp(ξ), (6,), its rotation at most π."""
+    """Return the twist ξ with Y = X exp(ξ), (6,), its rotation at most π."""
     return _free().difference(*(np.r_[_quaternions(pose[:3, :3]), pose[:3, 3]] for pose in (X, Y)))
 
 
 def fitted(hinge: OneHinge, X: np.ndarray, V: np.ndarray, guess: np.ndarray, tolerance: float) -> HingeFit:
-    """Coordinates whose pose is X, the nearest to the guess that were found, and velocities whose twist is V in least squares.
+    """Return coordinates with the pose X, the nearest found to the guess, and velocities with the twist V in least squares.
 
     Gauss-Newton's iteration on the hinge's group, q ← q exp(J(q)⁺ ξ) with ξ = log(X(q)⁻¹ X), its steps halved until ξ falls. J is constant
-    for a pin, a slider, a ball and a free hinge, which are there after one step, up to rounding. It starts at the guess, then from where it
-    has led nowhere at a screw's angle by its travel, and at random.
+    for a pin, a slider, a ball and a free hinge, which need one step, up to rounding. It starts at the guess; if that fails, from a screw's
+    angle by its travel, and at random.
     """
     best: tuple[np.ndarray, np.ndarray] | None = None
     scale = 1 + np.linalg.norm(X[:3, 3])
@@ -57,7 +57,7 @@ def fitted(hinge: OneHinge, X: np.ndarray, V: np.ndarray, guess: np.ndarray, tol
             best = q, error
         if _size(best[1], scale) <= tolerance:
             break
-    assert best is not None  # there is the guess
+    assert best is not None  # the guess always yields one
     q = hinge.nearest_turn(best[0], guess)
     J = hinge.jacobian(hinge.body, q)
     v = np.linalg.lstsq(J, V, rcond=None)[0] if hinge.nv else np.zeros(0)
@@ -65,7 +65,7 @@ def fitted(hinge: OneHinge, X: np.ndarray, V: np.ndarray, guess: np.ndarray, tol
 
 
 class OneHinge(DirectCalls, _core.Multibody):
-    """A body on a hinge of its own, to look at what the hinge can do."""
+    """A body on its own hinge, to examine the hinge's motions."""
 
     def __init__(self, body: str, hinge_name: str, hinge: dict[str, Any]):
         super().__init__(body, True, False)
@@ -73,7 +73,7 @@ class OneHinge(DirectCalls, _core.Multibody):
         self.body, self._subhinges = body, self._body(0)["hinge"]["subhinges"]
 
     def guess(self) -> np.ndarray:
-        """All coordinates zero, or the limit that is nearest to it."""
+        """Return zero coordinates, or the nearest limits."""
         q, hinge = np.array(self.zero_q()), self._body(0)["hinge"]
         for (at, _), lower, upper in zip(self._one_coordinate(), *self._limits(hinge), strict=False):
             q[at] = np.clip(0.0, lower, upper)
@@ -84,7 +84,7 @@ class OneHinge(DirectCalls, _core.Multibody):
         return ([hinge["lower"][i] for i in numbers], [hinge["upper"][i] for i in numbers]) if len(hinge["lower"]) else ([], [])
 
     def _one_coordinate(self) -> list[tuple[int, dict[str, Any]]]:
-        """Where the coordinates of subhinges that have one stand in q, with the subhinge."""
+        """Return the places in q of subhinges with one coordinate, with the subhinge."""
         found, at = [], 0
         for subhinge in self._subhinges:
             size = _core.subhinge_kinds[subhinge["kind"]].nq
@@ -93,7 +93,7 @@ class OneHinge(DirectCalls, _core.Multibody):
         return found
 
     def starts(self, X: np.ndarray, guess: np.ndarray) -> Any:
-        """Where to begin: the guess, screws turned until their travel is that of the pose, random configurations."""
+        """Yield starts: the guess, screws turned to the travel of the pose, random configurations."""
         yield guess
         if not self.nv:
             return
@@ -107,7 +107,7 @@ class OneHinge(DirectCalls, _core.Multibody):
             yield random_state(self, seed).q
 
     def nearest_turn(self, q: np.ndarray, guess: np.ndarray) -> np.ndarray:
-        """The same configuration with the angles of pins by whole turns, and quaternions by their sign, as near to the guess as can be."""
+        """Return the same configuration with the angles of pins by whole turns, and quaternions by their sign, nearest to the guess."""
         q, at = np.array(q), 0
         for subhinge in self._subhinges:
             kind = _core.subhinge_kinds[subhinge["kind"]]
@@ -121,7 +121,7 @@ class OneHinge(DirectCalls, _core.Multibody):
 
 
 def _descended(hinge: OneHinge, X: np.ndarray, q: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where the iteration leads from q, and what remains of the pose there."""
+    """Return the end of the iteration from q, and the remainder of the pose there."""
     error = twist_between(hinge.pose(hinge.body, q), X)
     weights = np.r_[np.ones(3), np.full(3, 1 / scale)]
     for _ in range(STEPS if hinge.nv else 0):
@@ -140,7 +140,7 @@ def _descended(hinge: OneHinge, X: np.ndarray, q: np.ndarray, scale: float) -> t
 
 
 def _size(error: np.ndarray, scale: float) -> float:
-    """The larger of rotation (rad) and translation over the scale of lengths (m)."""
+    """Return the larger of rotation (rad) and translation over the scale of lengths (m)."""
     return max(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])) / scale)
 
 

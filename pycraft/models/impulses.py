@@ -1,4 +1,4 @@
-"""What an impulse does that makes a model move as its hinges permit from now on: velocities, energies, momenta."""
+"""Impulses that change a model's motion to one that its hinges permit: velocities, energies, momenta."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .grafting import roots_of
 
 @dataclass(frozen=True)
 class Impulse:
-    """Velocities after an impulse that takes bodies into motions which the hinges of a model permit (see `impulse_into`).
+    """Velocities after an impulse that changes bodies' motions to those that the hinges of a model permit (see `impulse_into`).
 
     Attributes
     ----------
-    v : (nv,) velocities after, of all hinges
-    energy_before, energy_after : J, kinetic, rotors of the hinges with them
-    loss : J, ½ δ*Mδ of what the bodies' velocities (and rotors' rates) have lost; energy_before - energy_after, and never negative
-    momentum_before, momentum_after : (6,) of all bodies about the world's origin in its axes, angular first. They are the same in every
+    v : (nv,) velocities after the impulse, of all hinges
+    energy_before, energy_after : J, kinetic, including the rotors of the hinges
+    loss : J, ½ δ*Mδ of the lost velocities of bodies (and rates of rotors); energy_before - energy_after, and never negative
+    momentum_before, momentum_after : (6,) of all bodies about the world's origin in its axes, angular first. They are equal in every
         direction in which the base does not hold the model.
     """
 
@@ -36,25 +36,25 @@ class Impulse:
 
 
 def impulse_into(model: Any, V: np.ndarray) -> Impulse:
-    """The impulse that takes bodies of velocities V into motions of a model: a plastic impact, hinges without friction.
+    """Return the impulse that changes velocities V of bodies to motions of a model: a plastic impact, hinges without friction.
 
         (ℳ + J) v⁺ = HφM V⁻ + J v⁻
 
-    Impulses of hinges do no work on what the model may do: what a body and a rotor give, another gets, along every coordinate. v⁺ is the
-    projection of what was onto the motions of the model, orthogonal in kinetic energy, so that none is gained.
+    Impulses of hinges do no work on the motions of the model: along every coordinate they only transfer between bodies and rotors. v⁺ is
+    the projection of the earlier motion onto the motions of the model, orthogonal in kinetic energy, so that no energy is gained.
 
     Parameters
     ----------
-    model : at the configuration q of the impulse, with the rates that rotors of its hinges have before as v
+    model : at the configuration q of the impulse, with v the rates of its hinges' rotors before it
     V : (6n,) twists of its bodies before, in their own axes, angular first, in the model's order
 
-    Raises SingularHingeError as forward dynamics does. Cost: O(n).
+    Raises SingularHingeError as forward dynamics. Cost: O(n).
     """
     H, phi, M, J = model.soa("H phi M J")
     rotors, q = np.array(model.v), model.q
     gravity, still = np.array(model.gravity), np.zeros(model.nv)
     if gravity.any():
-        raise _core.ModelError("an impulse takes no time: gravity has no part in it")
+        raise _core.ModelError("an impulse is instantaneous: set gravity to zero for it")
     v = model.forward_dynamics(q, still, H @ (phi @ (M @ V)) + J @ rotors, refine=1) if model.nv else still
     after = phi.T @ (H.T @ v)
     before_energy, after_energy, lost = (
@@ -64,13 +64,13 @@ def impulse_into(model: Any, V: np.ndarray) -> Impulse:
 
 
 def twists_of(model: Any) -> np.ndarray:
-    """Twists of all bodies at the present state, (6n,) in their own axes: φ*H*v."""
+    """Return the twists of all bodies at the present state, (6n,) in their own axes: φ*H*v."""
     phi, H = model.soa("phi H")
     return phi.T @ (H.T @ np.array(model.v))
 
 
 def _momentum(model: Any, gathered: np.ndarray) -> np.ndarray:
-    """Of all that hangs on the base: what φ has gathered at its roots, moved to the world's origin."""
+    """Return the momentum of everything on the base: φ's sums at the roots, moved to the world's origin."""
     total = np.zeros(6)
     for k in roots_of(model):
         X = model.pose(model._body(k)["name"], model.q)

@@ -1,4 +1,4 @@
-"""Limits of coordinates: where they are, how far a configuration is from them, configurations moved inside."""
+"""Limits of coordinates: their values, distances of a configuration from them, and clamping."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..state import at_state
 
 
 class CoordinateLimits(NamedTuple):
-    """Limits (nv,) of all velocities' coordinates, -inf and inf where there are none, as of balls and free hinges; `q_index` (nv,): where
-    the coordinate stands in q, -1 for one of several that make a quaternion or a pose."""
+    """Limits (nv,) of the coordinates of v, -inf and inf if absent, as for balls and free hinges; `q_index` (nv,): the place of the
+    coordinate in q, -1 for one of several that make a quaternion or a pose."""
 
     lower: np.ndarray
     upper: np.ndarray
@@ -33,7 +33,7 @@ class Subhinge(NamedTuple):
 
 
 def subhinges(model: Any) -> Iterator[Subhinge]:
-    """The subhinges of a model, in the order of its coordinates."""
+    """Yield the subhinges of a model, in the order of its coordinates."""
     q = v = 0
     for k in range(model._size):
         hinge = model._body(k)["hinge"]
@@ -45,12 +45,12 @@ def subhinges(model: Any) -> Iterator[Subhinge]:
 
 
 def pin_coordinates(model: Any) -> np.ndarray:
-    """Which coordinates (nv,) are angles of pins. O(N)."""
+    """Return which coordinates (nv,) are angles of pins. O(N)."""
     return np.concatenate([np.zeros(0, bool), *(np.full(one.v.stop - one.v.start, one.kind == "pin") for one in subhinges(model))])
 
 
 def coordinate_limits(model: Any) -> CoordinateLimits:
-    """The limits of a model's coordinates. O(N)."""
+    """Return the limits of a model's coordinates. O(N)."""
     lower, upper, q_index = np.full(model.nv, -np.inf), np.full(model.nv, np.inf), np.full(model.nv, -1)
     for one in subhinges(model):
         if one.q.stop - one.q.start == 1:
@@ -59,17 +59,18 @@ def coordinate_limits(model: Any) -> CoordinateLimits:
 
 
 def checked_q(model: Any, q: Any) -> np.ndarray:
-    """q (nq,) or (B, nq) of an argument by the rule of states. ModelError of the core for a wrong size or what is not finite."""
+    """Return q (nq,) or (B, nq) of an argument by the rule of states. ModelError of the core for a wrong size or values that are not
+    finite."""
     q = np.asarray(_core.real_array(at_state(model, q)[0], "q"), float)
     model.configuration_rate(q, np.zeros(model.nv))  # the core's own checks
     return q
 
 
 class LimitDistances(Closed):
-    """How far coordinates are from their limits, rad or m, negative outside, inf where there is none.
+    """Distances of coordinates from their limits, rad or m, negative outside, inf without a limit.
 
-    `names` (nv), `lower` (nv,) = q - lower limit, `upper` (nv,) = upper limit - q, each with the batch's leading axis. Along q their
-    derivatives are +1 and -1.
+    `names` (nv), `lower` (nv,) = q - lower limit, `upper` (nv,) = upper limit - q, each with the batch's leading axis. Their derivatives by
+    q are +1 and -1.
     """
 
     def __init__(self, names: tuple[str, ...], lower: np.ndarray, upper: np.ndarray):
@@ -82,23 +83,23 @@ class LimitDistances(Closed):
 
     @property
     def lower(self) -> np.ndarray:
-        """(nv,) or (B, nv), q less the lower limit."""
+        """(nv,) or (B, nv), q minus the lower limit."""
         return self._lower
 
     @property
     def upper(self) -> np.ndarray:
-        """(nv,) or (B, nv), the upper limit less q."""
+        """(nv,) or (B, nv), the upper limit minus q."""
         return self._upper
 
     @property
     def smallest(self) -> Any:
-        """The least of all distances, a number or (B,); inf where nothing is limited."""
+        """The least of all distances, a number or (B,); inf without limits."""
         least = np.minimum(self._lower, self._upper).min(axis=-1, initial=np.inf)
         return float(least) if least.ndim == 0 else least
 
     @property
     def nearest(self) -> list:
-        """(name, "lower" or "upper", distance) of every limit there is, the nearest first; of a batch a list of such lists."""
+        """(name, "lower" or "upper", distance) of every limit, the nearest first; for a batch a list of such lists."""
         if self._lower.ndim == 1:
             return self._sorted(self._lower, self._upper)
         return [self._sorted(*one) for one in zip(self._lower, self._upper, strict=True)]

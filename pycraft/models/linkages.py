@@ -1,6 +1,6 @@
-"""Models of linkages that everybody knows: trees with their loops declared (docs/loops.md), at a state on them.
+"""Models of well-known linkages: trees with their loops declared (docs/loops.md), at a state on them.
 
-Bodies are thin rods where nothing else is said; lengths in m, masses in kg.
+Bodies are thin rods unless stated otherwise; lengths in m, masses in kg.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .multibody import Multibody
 
 
 def rod(length: float = 1.0, mass: float = 1.0, direction: Any = (1, 0, 0)) -> dict[str, Any]:
-    """A thin rod from its hinge along a direction: mass, com and inertia of `add_body`."""
+    """Return a thin rod from its hinge along a direction: mass, com and inertia of `add_body`."""
     along = np.asarray(direction, float) / np.linalg.norm(direction)
     return {"mass": mass, "com": length / 2 * along, "inertia": mass * length**2 / 12 * (np.eye(3) - np.outer(along, along))}
 
@@ -33,10 +33,11 @@ def _on_circle(radius: float, angle: float, height: float) -> np.ndarray:
 
 
 def n_four_bar(windows: int = 1, angle: float = np.pi / 2) -> Multibody:
-    """N four-bars side by side: N + 1 cranks on the ground, joined at their tips by N rods, all of 1 m and 1 kg, in the plane of x and y.
+    """Return N four-bars side by side: N + 1 cranks on the ground, joined at their tips by N rods, all of 1 m and 1 kg, in the plane of x
+    and y.
 
-    Coordinate 0 is the angle of the first crank from +x. In line (angle 0) the linkage is singular: there every rhombus may become an
-    antiparallelogram.
+    Coordinate 0 is the angle of the first crank from +x. At angle 0, stretched out, the linkage is singular: every rhombus may become an
+    antiparallelogram there.
 
     Source: M. González, F. González, A. Luaces, J. Cuadrado, A collaborative benchmarking framework for multibody system dynamics,
     Engineering with Computers 26, 2010 (IFToMM library of benchmark problems, A02).
@@ -62,9 +63,9 @@ def n_four_bar(windows: int = 1, angle: float = np.pi / 2) -> Multibody:
 
 
 def bricard() -> Multibody:
-    """Bricard's linkage: six bars of 1 m along edges of a cube, one of them the ground, each pin across both of its bars.
+    """Return Bricard's linkage: six bars of 1 m along edges of a cube, one of them the ground, each pin perpendicular to both of its bars.
 
-    One degree of freedom, where rows would leave none: one of five is redundant at every state, and no particular one is.
+    One degree of freedom, although the rows suggest none: one of five is redundant at every state, and no particular one is.
     Source: as `n_four_bar`, A04.
     """
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], float)
@@ -78,18 +79,18 @@ def bricard() -> Multibody:
 
 
 def slider_crank(crank: float = 0.15, connecting_rod: float = 0.2, slider: float = 0.5, angle: float = np.pi / 4) -> Multibody:
-    """A crank turns about z, its rod pushes a block along x.
+    """Return a slider-crank: a crank turns about z, its rod pushes a block along x.
 
     Parameters
     ----------
-    crank, connecting_rod : m, of 1 kg a metre; the rod is the longer one
+    crank, connecting_rod : m, of 1 kg per metre; the rod is the longer one
     slider : kg
     angle : rad, of the crank from x
     """
     crank, connecting_rod, slider, angle = _numbers(crank=crank, connecting_rod=connecting_rod, slider=slider, angle=angle)
     if not 0 < crank < connecting_rod < np.inf:
         raise _core.ModelError(
-            f"crank={crank}, connecting_rod={connecting_rod}: positive, and the rod the longer one, or it does not turn around"
+            f"crank={crank}, connecting_rod={connecting_rod}: lengths are positive, and the rod is longer than the crank"
         )
     model = Multibody("slider-crank")
     model.add_body("crank", **rod(crank, crank))
@@ -102,14 +103,14 @@ def slider_crank(crank: float = 0.15, connecting_rod: float = 0.2, slider: float
 
 
 def peaucellier(long: float = 1.0, short: float = 0.4, crank: float = 0.35, angle: float = 0.3) -> Multibody:
-    """Peaucellier's and Lipkin's linkage: node "pen" of body "far0" goes along a straight line, x = (long² - short²)/(2 crank).
+    """Return Peaucellier's and Lipkin's linkage: node "pen" of body "far0" moves along a straight line, x = (long² - short²)/(2 crank).
 
-    Two bars of the length `long` turn about the origin, a rhombus of the side `short` hangs between them, whose near corner a crank carries
+    Two bars of the length `long` turn about the origin, between them a rhombus of the side `short`, with its near corner carried by a crank
     on a circle through the origin: near and far corner are inverse to each other.
 
     Parameters
     ----------
-    long, short, crank : m, of 1 kg a metre; 2 crank < long - short and more for a pen in reach
+    long, short, crank : m, of 1 kg per metre; the pen is in reach only if 2 crank < long - short, or less
     angle : rad, of the crank from x
     """
     long, short, crank, angle = _numbers(long=long, short=short, crank=crank, angle=angle)
@@ -141,11 +142,11 @@ def peaucellier(long: float = 1.0, short: float = 0.4, crank: float = 0.35, angl
 
 
 def five_bar(base: float = 0.3, inner: float = 0.2, outer: float = 0.3, angles: Any = (2.0, 1.1)) -> Multibody:
-    """A planar parallel robot: two motors on the ground, two arms that hold one tip, node "tip" of body "outer0".
+    """Return a planar parallel robot: two motors on the ground, two arms that hold one tip, node "tip" of body "outer0".
 
     Parameters
     ----------
-    base, inner, outer : m, between the motors and of the bars, of 1 kg a metre
+    base, inner, outer : m, between the motors and of the bars, of 1 kg per metre
     angles : rad, of the two motors from x
     """
     base, inner, outer = _numbers(base=base, inner=inner, outer=outer)
@@ -174,12 +175,12 @@ def five_bar(base: float = 0.3, inner: float = 0.2, outer: float = 0.3, angles: 
 
 
 def stewart(base: float = 1.0, plate: float = 0.6, height: float = 1.0) -> Multibody:
-    """A hexapod: a plate flies freely, six legs stand on universal hinges, slide, and hold it by balls; node "plate" is its centre.
+    """Return a hexapod: a free plate on six legs with universal hinges, sliders, and balls at the plate; node "plate" is its centre.
 
     Parameters
     ----------
     base, plate : m, radii of the legs' feet and of their heads, in pairs 120° apart
-    height : m, of the plate at its state
+    height : m, of the plate at the model's state
     """
     base, plate, height = _numbers(base=base, plate=plate, height=height)
     for name, value in (("base", base), ("plate", plate), ("height", height)):
@@ -210,9 +211,10 @@ def stewart(base: float = 1.0, plate: float = 0.6, height: float = 1.0) -> Multi
 
 
 def delta(base: float = 0.2, plate: float = 0.05, upper: float = 0.3, lower: float = 0.6, position: Any = (0.0, 0.0, -0.5)) -> Multibody:
-    """A Delta robot: three motors on the ground turn arms, each holds the plate by two parallel rods, so that it moves without turning.
+    """Return a Delta robot: three motors on the ground turn arms, each holds the plate by two parallel rods, so that it moves without
+    turning.
 
-    Node "plate" is the centre of its body "platform". Coordinates are those of the platform, free, then of each arm its angle below the
+    Node "plate" is the centre of its body "platform". Coordinates belong to the free platform, then for each arm its angle below the
     horizontal and those of its two rods, universal hinges.
 
     Source: R. Clavel, Conception d'un robot parallèle rapide à 4 degrés de liberté, thèse 925, EPFL, 1991.
@@ -220,8 +222,8 @@ def delta(base: float = 0.2, plate: float = 0.05, upper: float = 0.3, lower: flo
     Parameters
     ----------
     base, plate : m, radii of the motors and of the rods' ends
-    upper, lower : m, of the arms and of the rods, 1 kg a metre
-    position : (3,) m, of the plate at its state, below the motors; elbows point outward
+    upper, lower : m, of the arms and of the rods, 1 kg per metre
+    position : (3,) m, of the plate at the model's state, below the motors; elbows point outward
     """
     base, plate, upper, lower = _numbers(base=base, plate=plate, upper=upper, lower=lower)
     place = np.asarray(_core.real_array(position, "position"), float)
@@ -234,7 +236,7 @@ def delta(base: float = 0.2, plate: float = 0.05, upper: float = 0.3, lower: flo
     for i in range(3):
         out = _on_circle(1.0, 2 * np.pi * i / 3, 0)
         side = np.cross(z, out)
-        way = place + (plate - base) * out  # from the motor to where the rods end
+        way = place + (plate - base) * out  # from the motor to the end of the rods
         along, down = way @ out, -way @ z
         cosine = (way @ way + upper**2 - lower**2) / (2 * upper * np.hypot(along, down))
         if not abs(cosine) <= 1:
@@ -255,10 +257,10 @@ def delta(base: float = 0.2, plate: float = 0.05, upper: float = 0.3, lower: flo
 
 
 def andrews() -> Multibody:
-    """Andrews' squeezer: seven bodies in a plane, three loops that end in one point, within 30 ms and some centimetres.
+    """Return Andrews' squeezer: seven bodies in a plane, three loops that end in one point, moving within 30 ms and some centimetres.
 
-    Nodes "spring" of "K3" and "anchor" of the base are what its spring hangs between, of 4530 N/m and 0.07785 m at rest; "K1" is driven by
-    0.033 N m. No gravity.
+    Its spring joins nodes "spring" of "K3" and "anchor" of the base, with 4530 N/m and 0.07785 m at rest; "K1" is driven by 0.033 N m. No
+    gravity.
     Source: F. Mazzia, C. Magherini, Test set for initial value problem solvers, 2008, "Andrews' squeezing mechanism" (IFToMM A03).
     """
     model = Multibody("andrews")
@@ -289,20 +291,20 @@ def andrews() -> Multibody:
 
 
 def _box(mass: float, *sides: float) -> np.ndarray:
-    """The inertia of a solid box about its centre of mass, kg m²."""
+    """Return the inertia of a solid box about its centre of mass, kg m²."""
     squares = np.square(sides)
     return np.asarray(mass / 12 * np.diag(squares.sum() - squares))
 
 
 def flyball_governor(rigid: bool = False) -> Multibody:
-    """Watt's governor: a shaft turns about z, a slider goes along it, two rods hang from its top, of 1 m, with 5 kg at their ends.
+    """Return Watt's governor: a shaft turns about z, a slider moves along it, two rods hang from its top, of 1 m, with 5 kg at their ends.
 
-    Nodes "middle0" and "middle1" of the rods and "collar0" and "collar1" of the slider are 0.5 m from each other, which springs and dampers
-    keep them, or with rigid=True loops, "coupler0" and "coupler1". Coordinates are the shaft's angle, the slider's height and the angles
-    of the rods below the horizontal, 0.5 m and 30° at first.
+    Nodes "middle0" and "middle1" of the rods and "collar0" and "collar1" of the slider are 0.5 m from each other, held by springs and
+    dampers, or with rigid=True by loops, "coupler0" and "coupler1". Coordinates are the shaft's angle, the slider's height and the angles
+    of the rods below the horizontal, initially 0.5 m and 30°.
 
     Source: M. González, D. Dopico, U. Lugrís, J. Cuadrado, A benchmarking system for MBS simulation software, Multibody System Dynamics 16,
-    2006 (IFToMM library of benchmark problems, A05, "stiff flyball governor"), whose couplers are springs.
+    2006 (IFToMM library of benchmark problems, A05, "stiff flyball governor", with springs as couplers).
     """
     model, density, thin = Multibody("flyball governor"), 3000.0, 0.01
     bar, ball = density * thin**2, 5.0

@@ -1,4 +1,4 @@
-"""Hinges locked where they are and unlocked again: mechanisms that change while they move."""
+"""Lock hinges where they are and unlock them again: mechanisms that change during motion."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 class Stop(NamedTuple):
-    """What `lock` did to the motion.
+    """The effect of `lock` on the motion.
 
     hinges : names of the hinges that were locked, in the model's order
     energy_before, energy_after : kinetic energy (J), rotors included
-    loss : what of it is gone (J): -½ v·p over the locked hinges, half the square of their velocity by the Schur complement of ℳ + J. Never
-        negative but for rounding, and found without a difference of large numbers.
+    loss : the lost energy (J): -½ v·p over the locked hinges, half the square of their velocity by the Schur complement of ℳ + J. Never
+        negative except for rounding, and computed without a difference of large values.
     momentum_before, momentum_after : (6,), of all bodies about the world's origin in world axes, angular first (N m s, N s)
-    impulses : by hinge the impulse that stopped it, one number a coordinate (N m s, N s)
+    impulses : by hinge the impulse that stopped it, one value per coordinate (N m s, N s)
     """
 
     hinges: tuple[str, ...]
@@ -39,32 +39,30 @@ class Stop(NamedTuple):
 
 
 class Locking(Grafting):
-    """Hinges that are locked, and unlocked."""
+    """Locking and unlocking of hinges."""
 
     _whole: Multibody | None
     _hinges_before: Mapping[str, dict[str, Any]] = {}
-    """Of each locked hinge "hinge" and "q" as they were, "body" that it moves, "welded", its placement since; what the model's file said of
-    its coordinates, "left aside" and "actuators"."""
+    """For each locked hinge: "hinge" and "q" as they were, "body" that it moves, "welded", its placement since; the data of the model's
+    file on its coordinates, "left aside" and "actuators"."""
     kinetic_energy: Callable[..., Any]
     momentum: Callable[..., Any]
     _sums: Callable[..., np.ndarray]
 
     def lock(self, hinges: Any, *, impulsive: bool = False) -> Stop:
-        """Lock hinges where they are: they become welds, with their names, and have no coordinates until they are unlocked.
+        """Lock hinges where they are: they become welds with the same names, without coordinates until they are unlocked.
 
-        Bodies, nodes and frames stay where they are, with their names; q and v of the other hinges are carried over. A coupling of
-        `loops` holds its other coordinates by the locked ones, until they are unlocked. Operators and parts
-        made before are stale. A rotor on a locked hinge does not spin. Locked bodies still cost a step of each sweep; `coalesce` makes
-        them one with what carries them.
+        Bodies, nodes and frames stay where they are, with their names; q and v of the other hinges are carried over. A coupling of `loops`
+        constrains its other coordinates with the locked ones constant, until they are unlocked. Operators and parts made before are stale.
+        A rotor on a locked hinge does not spin. Locked bodies still cost a step of each sweep; `coalesce` merges them with their carriers.
 
         Parameters
         ----------
         hinges : names, patterns of them ("left_*", "finger?"), or handles, one or several
-            A pattern is of hinges that have coordinates.
+            A pattern matches hinges that have coordinates.
         impulsive : bool
-            Hinges that move are stopped at once, by impulses at these hinges alone: momenta along the coordinates that stay are kept,
-            v⁺ = v_f + (ℳ_ff + J_f)⁻¹ ℳ_fl v_l, and so are the momenta of a model that floats freely. Energy is lost. Left False, hinges
-            that move are not locked.
+            Stop moving hinges at once, by impulses at these hinges alone: momenta along the remaining coordinates are conserved, v⁺ = v_f +
+            (ℳ_ff + J_f)⁻¹ ℳ_fl v_l, and so are the momenta of a freely floating model. Energy is lost. If False, moving hinges are refused.
 
         Returns
         -------
@@ -73,12 +71,12 @@ class Locking(Grafting):
         Raises
         ------
         ModelError
-            A name that is not there, a hinge without coordinates, a hinge that moves where `impulsive` is False, all hinges that a
-            coupling of `loops` is of; a part, whose structure is the whole's. The model is as it was.
+            An unknown name, a hinge without coordinates, a moving hinge unless `impulsive`, all hinges of a coupling of `loops`; a part:
+            its structure belongs to the whole model. The model is unchanged.
         SingularHingeError
-            Of impulsive locking: a coordinate that stays feels no inertia.
+            In impulsive locking: a remaining coordinate feels no inertia.
 
-        Cost: O(N), far below that of the next evaluation, which sees a model of other coordinates; impulsive, a forward dynamics more.
+        Cost: O(N), far below the cost of the next evaluation with other coordinates; impulsive locking adds one forward dynamics.
 
         Examples
         --------
@@ -107,7 +105,7 @@ class Locking(Grafting):
             rate = ", ".join(f"{x:.6g}" for x in v[slices[moving][1]])
             raise _core.ModelError(
                 f"hinge {names[moving]!r} moves (v = {rate}) and is locked at rest only;"
-                " impulsive=True stops it by an impulse and says what energy that loses"
+                " impulsive=True stops it by an impulse and reports the lost energy"
             )
         after, impulses = (v, np.zeros(self.nv)) if moving is None else self._stop_at_once(numbers)
         stop = self._stopped(names, slices, v, after, impulses)
@@ -116,25 +114,25 @@ class Locking(Grafting):
         return stop
 
     def unlock(self, hinges: Any = None) -> list[str]:
-        """Unlock hinges, all where none are named: each is what it was when it was locked, at the coordinates it had, and at rest.
+        """Unlock hinges, default: all. Each returns to its state before it was locked, at the coordinates that it had, and at rest.
 
-        Nothing moves otherwise than before: poses, velocities, momentum and energy stay, to rounding. Bit for bit the hinge is what it was
-        unless its placement was set while it was locked, or what carries it was coalesced: then its old placement moves along.
+        No motion changes: poses, velocities, momentum and energy stay, to rounding. The hinge is restored bit for bit unless its placement
+        was set while it was locked, or its carrier was coalesced: then its old placement moves along.
 
         Parameters
         ----------
-        hinges : names, patterns of names, or handles, one or several; of locked hinges
+        hinges : names, patterns of names, or handles of locked hinges, one or several
 
         Returns
         -------
-        list of str : the hinges that are unlocked, in the order in which they were locked
+        list of str : the unlocked hinges, in the order in which they were locked
 
         Raises
         ------
         ModelError
-            A hinge that is not locked, or whose body is coalesced: split it first; a coordinate whose name another one took meanwhile.
+            A hinge that is not locked, or that moves a coalesced body: split it first; a coordinate with a name that is in use by now.
 
-        Cost: as of `lock`.
+        Cost: as `lock`.
         """
         self._unlock([])  # a part refuses
         locked = self.locked
@@ -150,7 +148,7 @@ class Locking(Grafting):
         return names
 
     def _held_couplings(self, more: Mapping[str, np.ndarray]) -> dict[str, dict[str, Any]]:
-        """Couplings as they are to be declared where more hinges are locked, at these coordinates, beside those that are."""
+        """Return the declarations of couplings with more hinges locked, at these coordinates, beside those locked already."""
         if not self._kept_loops:
             return {}
         locked = {name: one["q"] for name, one in self._hinges_before.items()}
@@ -162,7 +160,7 @@ class Locking(Grafting):
 
     @property
     def locked(self) -> list[str]:
-        """Names of the locked hinges, in the order in which they were locked; of a part those that are its own."""
+        """Names of the locked hinges, in the order in which they were locked; for a part, its own."""
         kept = self._hinges_before if self._whole is None else self._whole._hinges_before
         if not kept:
             return []
@@ -170,7 +168,7 @@ class Locking(Grafting):
         return [name for name, one in kept.items() if name in own and self._is_locked(name, one["body"])]
 
     def _locked_now(self, numbers: list[int], v: np.ndarray) -> None:
-        """Locks the hinges of these bodies, velocities of the others from v."""
+        """Lock the hinges of these bodies, with velocities of the others from v."""
         kept, aside = dict(self._hinges_before), Asides(self)
         for k in numbers:
             body = self._body(k)
@@ -184,8 +182,8 @@ class Locking(Grafting):
         self._hinges_before = kept
 
     def _require_uncoupled(self, hinge: str) -> None:
-        """What couples a coordinate of a hinge would couple another one, metres for radians, when another hinge has its name, and none
-        when it is locked."""
+        """Refuse a hinge with coupled coordinates: its coupling would apply to another coordinate, metres for radians, when another hinge
+        gets its name, and to none while it is locked."""
         for name in self._kept_loops or ():
             if self.loops[name].kind == "coupling" and hinge in self.loops._stands_on(name):
                 what = f"hinge {hinge!r} is in use: its coordinates are those of coupling {name!r}"
@@ -198,7 +196,7 @@ class Locking(Grafting):
         return self._named_among(hinges, moving, self._why_not_locked)
 
     def _named_among(self, given: Any, known: list[str], why_not: Callable[[str], str]) -> list[str]:
-        """The names among those known that are given, each once. ModelError for one that is not, and for a pattern that fits none."""
+        """Return the known names that are given, each once. ModelError for an unknown name, and for a pattern that matches none."""
         found: dict[str, None] = {}
         there = set(known)
         for one in several(given, (str, Hinge)):
@@ -227,14 +225,14 @@ class Locking(Grafting):
         return f"hinge {name!r} ({kind}) was not locked in this model; {locked}"
 
     def _kind_of(self, name: str) -> str | None:
-        """Of a hinge; None of a pattern. ModelError, with the names there are, where no hinge is called so."""
+        """Return the kind of a hinge; None for a pattern. ModelError, with the known names, for an unknown hinge."""
         names = self._names()[1]
         if name not in names and _is_pattern(name):
             return None
         return self._body(self._hinge_index(name))["hinge"]["kind"]
 
     def _is_locked(self, name: str, body: str) -> bool:
-        """Whether the hinge of this name is the one that was locked: a weld, and of the same body."""
+        """Check that the hinge of this name is the one that was locked: a weld of the same body."""
         now = self._body(self._hinge_index(name))
         return now["name"] == body and not now["hinge"]["subhinges"]
 
@@ -254,7 +252,7 @@ class Locking(Grafting):
         )
 
     def _whole_momentum(self, v: np.ndarray) -> np.ndarray:
-        """Of all bodies about the world's origin, in one sweep."""
+        """Return the momentum of all bodies about the world's origin, in one sweep."""
         if not self.mass:
             return self.momentum(self.q, v).value
         sums = self._sums(self.q, v, "double")

@@ -1,4 +1,4 @@
-"""Loops of a model and their rows: what closes its chains, rolls, or couples its coordinates (docs/loops.md)."""
+"""Loops of a model and their rows: closures of chains, rolling, or couplings of coordinates (docs/loops.md)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .held_couplings import with_held
 from .hinge_axes import hinge_axes
 
 Relation = Callable[[np.ndarray], Any]
-"""A function of coordinates (n,): (r, its gradient (n,), its second derivatives (n, n)), and if it has them third ones (n, n, n)."""
+"""A function of coordinates (n,): (r, its gradient (n,), its second derivatives (n, n)), and optionally third ones (n, n, n)."""
 
 
 class Loop(Closed):
     """A loop of a model, by its name: `.kind`, `.rows`, and its own rows of `residual`, `jacobian` and `bias`.
 
-    Arguments and costs are those of the calls of all loops, `Loops`, of which these are slices.
+    Arguments and costs are the same as for the calls on all loops, `Loops`; these are slices of them.
 
     Examples
     --------
@@ -50,13 +50,13 @@ class Loop(Closed):
 
     @property
     def kind(self) -> str:
-        """Of its hinge ("pin", ...; "ball" of a gimbal, too, "custom" of one with oblique axes), or "blade", "wheel",
-        "rolling ball", "surface", "curve", "coupling"."""
+        """The kind of its hinge ("pin", ...; "ball" also for a gimbal, "custom" for one with oblique axes), or "blade", "wheel", "rolling
+        ball", "surface", "curve", "coupling"."""
         return self._loops._core.kind(self._name)
 
     @property
     def slice(self) -> slice:
-        """Where its rows stand among those of all loops."""
+        """The place of its rows among those of all loops."""
         place, first = self._loops._place(self._name)
         return slice(first[place], first[place + 1])
 
@@ -66,15 +66,15 @@ class Loop(Closed):
         return self._loops.rows[self.slice]
 
     def residual(self, q=None, *, precision: str = "double") -> np.ndarray:
-        """r (rows,) or (B, rows): see `Loops.residual`."""
+        """Return r (rows,) or (B, rows): see `Loops.residual`."""
         return self._loops.residual(q, precision=precision)[..., self.slice]
 
     def jacobian(self, q=None, *, precision: str = "double") -> np.ndarray:
-        """Q (rows, nv) or (B, rows, nv): see `Loops.jacobian`."""
+        """Return Q (rows, nv) or (B, rows, nv): see `Loops.jacobian`."""
         return self._loops.jacobian(q, precision=precision)[..., self.slice, :]
 
     def bias(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
-        """Q̇θ̇ (rows,) or (B, rows): see `Loops.bias`."""
+        """Return Q̇θ̇ (rows,) or (B, rows): see `Loops.bias`."""
         return self._loops.bias(q, v, precision=precision)[..., self.slice]
 
     def remove(self) -> None:
@@ -85,19 +85,19 @@ class Loop(Closed):
         try:
             rows = len(self.rows)
         except _core.ModelError:
-            return f"<loop {self._name!r}: not there, or left without what it was declared on>"
+            return f"<loop {self._name!r}: missing, or without the bodies that it was declared on>"
         return f"<loop {self._name!r}: {self.kind}, {rows} row{'' if rows == 1 else 's'}>"
 
 
 class Loops(Closed, Mapping):
     """The loops of a model by name, in order of declaration, and the rows of all of them.
 
-    A row of positions has a residual r(q), zero where it is kept; with θ̇ the model's v, it asks Q θ̇ = 0 and Q θ̈ + Q̇θ̇ = 0. A row of
-    velocities (rolling, blades) asks the last two alone. Q is the derivative of r exactly, where the loops are open too.
+    A row of positions has a residual r(q), zero where it is kept; with θ̇ the model's v, it requires Q θ̇ = 0 and Q θ̈ + Q̇θ̇ = 0. A row of
+    velocities (rolling, blades) requires only the last two. Q is the exact derivative of r, also where the loops are open.
 
-    The calls take q and v as direct calls do: one state, a batch (B, ...), a `State`, or without any the model's present one; and
-    precision "single" to "quad". Cost: the hinges around the loops, a state. ModelError for a loop that lost a body, node or hinge of
-    its own: it names the loop.
+    The calls take q and v as direct calls do: one state, a batch (B, ...), a `State`, or by default the model's present state; and
+    precision "single" to "quad". Cost: the hinges around the loops, per state. ModelError for a loop that has lost a body, node or hinge:
+    it names the loop.
 
     Examples
     --------
@@ -121,11 +121,11 @@ class Loops(Closed, Mapping):
     # ------------------------------------------------------------------ rows
     @property
     def rows(self) -> list[str]:
-        """Names of all rows: "loop: direction", of couplings the name alone. x, y, z are axes of the hinge, z along its own axis."""
+        """Names of all rows: "loop: direction", for couplings the name alone. x, y, z are axes of the hinge, z along its own axis."""
         return self._core.rows()[0]
 
     def numbered(self) -> tuple[Mapping[str, int], Sequence[int]]:
-        """The loops' numbers by name, and where the rows of each begin, one more: the end. Kept until a loop is added or taken away."""
+        """Return the loops' numbers by name, and the first row of each, and the end. Cached until a loop is added or removed."""
         edits = self._core.edits
         if self._numbered is None or self._numbered[0] != edits:
             self._numbered = edits, {name: i for i, name in enumerate(self._core.names())}, self._core.first_rows()
@@ -133,23 +133,24 @@ class Loops(Closed, Mapping):
 
     @property
     def of_positions(self) -> np.ndarray:
-        """Which rows (rows,) are of positions, and not of velocities alone."""
+        """Mask (rows,) of rows of positions, as opposed to rows of velocities."""
         return np.array(self._core.rows()[1], dtype=bool)
 
     @property
     def ends(self) -> list[str]:
-        """Bodies and nodes that loops of two ends were declared on, each once, the base left out: those that `soa.A` is of."""
+        """Bodies and nodes on which loops of two ends were declared, each once, without the base: the nodes of `soa.A`."""
         return self._core.ends(self._core.operators(self._model.soa._source))
 
     def residual(self, q=None, *, precision: str = "double") -> np.ndarray:
-        """r (rows,) or (B, rows), zero where the loops are closed, and of rows of velocities; metres, and radians to first order."""
+        """Return r (rows,) or (B, rows), zero where the loops are closed, and for rows of velocities; metres, and radians to first
+        order."""
         return self._core.residual(at_state(self._model, q)[0], precision)
 
     def sizes(self, q=None, *, precision: str = "double") -> np.ndarray:
-        """What each row is measured by, (rows,) or (B, rows): the largest of its entries in Q, of lengths before anything cancels in them.
+        """Return the scale of each row, (rows,) or (B, rows): the largest of its entries in Q, of lengths before cancellation.
 
-        Metres and radians a unit of the coordinate that moves it most; one where none does. A residual r is off by r/size of that
-        coordinate, in a watch as in a crane. Cost: the rows' entries; no Q is made.
+        Metres and radians per unit of the coordinate that moves it most; one if none does. A residual r corresponds to r/size of that
+        coordinate, in a watch as in a crane. Cost: the rows' entries; Q is not formed.
 
         Examples
         --------
@@ -163,7 +164,7 @@ class Loops(Closed, Mapping):
         return np.where(sizes > 0, sizes, 1.0)
 
     def jacobian(self, q=None, *, precision: str = "double") -> np.ndarray:
-        """Q (rows, nv) or (B, rows, nv): ṙ = Q θ̇, and of rows of velocities what is zero. Exact zeros for hinges that are around no loop.
+        """Return Q (rows, nv) or (B, rows, nv): ṙ = Q θ̇, zero for rows of velocities. Exact zeros for hinges around no loop.
 
         Examples
         --------
@@ -176,7 +177,7 @@ class Loops(Closed, Mapping):
         return self._core.jacobian(at_state(self._model, q)[0], precision)
 
     def rates(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
-        """Qθ̇ (rows,) or (B, rows): ṙ, and of rows of velocities what is zero. Cost: the rows' entries; no Q is made.
+        """Return Qθ̇ (rows,) or (B, rows): ṙ, or the rates of rows of velocities. Cost: the rows' entries; Q is not formed.
 
         Examples
         --------
@@ -189,18 +190,18 @@ class Loops(Closed, Mapping):
         return self._core.rates(*at_state(self._model, q, v), precision)
 
     def bias(self, q=None, v=None, *, precision: str = "double") -> np.ndarray:
-        """Q̇θ̇ (rows,) or (B, rows): what is left of the rows' second derivatives at θ̈ = 0."""
+        """Return Q̇θ̇ (rows,) or (B, rows): the rows' second derivatives at θ̈ = 0."""
         return self._core.bias(*at_state(self._model, q, v), precision)
 
     def acceleration(self, q=None, v=None, vdot=None, *, fix: Any = ()) -> np.ndarray:
-        """v̇ (nv,) or (B, nv) that keeps the rows, Q v̇ + Q̇v = 0, the nearest to `vdot`: v̇ = vdot - Q⁺(Q vdot + Q̇v).
+        """Return v̇ (nv,) or (B, nv) that keeps the rows, Q v̇ + Q̇v = 0, the nearest to `vdot`: v̇ = vdot - Q⁺(Q vdot + Q̇v).
 
         Parameters
         ----------
-        q, v, vdot : a state on the loops, and accelerations to start from; zero where v and vdot are left out
-        fix : names of hinges or coordinates, or a list of them, whose accelerations stay as they are
+        q, v, vdot : a state on the loops, and accelerations to start from; default: v and vdot zero
+        fix : names of hinges or coordinates, or a list of them, with fixed accelerations
 
-        EvaluationError where no accelerations of the others keep a row, by its name, as where v leaves the loops at a singular state or
+        EvaluationError if no accelerations of the others keep a row, by its name, for instance if v leaves the loops at a singular state or
         too many are fixed. Cost: dense factors of Q.
 
         Examples
@@ -236,18 +237,18 @@ class Loops(Closed, Mapping):
         return start
 
     def coupled(self, name: str) -> list[int]:
-        """The numbers of the coordinates that a coupling is of, in its order. KeyError where there is none of that name."""
+        """Return the numbers of the coordinates of a coupling, in its order. KeyError if there is none of that name."""
         terms = self._declared[name].get("terms", ())
         return [self._model.hinges[hinge].v_slice.start + coordinate for hinge, coordinate, _ in terms]
 
     def ends_of(self, name: str) -> tuple[str, str]:
-        """The bodies or nodes b and a that a loop joins: "" of the base, and twice of a coupling. KeyError where none has that name."""
+        """Return the bodies or nodes b and a that a loop joins: "" for the base, and twice for a coupling. KeyError for an unknown name."""
         declared = self._declared[name]
         return declared.get("b", ""), declared.get("a", "")
 
     # ------------------------------------------------------------------ edits
     def remove(self, name: str | Loop) -> None:
-        """Remove a loop. ModelError where there is none of that name."""
+        """Remove a loop. ModelError if there is none of that name."""
         name = name.name if isinstance(name, Loop) else text(name, "a loop")
         self._core.remove(name)
         self._declared.pop(name)
@@ -267,26 +268,26 @@ class Loops(Closed, Mapping):
         return self._declare(declared | {"pitch": one_number(given["pitch"], f"the pitch of {what}")})
 
     def add_pair(self, b: Any, a: Any, kind: str, radius: Any, name: str | None) -> Loop:
-        """Something that rolls: see `Multibody.add_rolling`."""
+        """Add a rolling pair: see `Multibody.add_rolling`."""
         return self._declare(self._ends(a, b, name) | {"kind": kind, "radius": one_number(radius, "radius")})
 
     def add_surface(self, b: Any, a: Any, quadratic: Any, linear: Any, constant: Any, name: str | None) -> Loop:
-        """A surface for a point: see `Multibody.add_surface`."""
+        """Add a surface for a point: see `Multibody.add_surface`."""
         declared = self._ends(a, b, name) | {"kind": "surface"}
         what = f"of the surface of {declared['name']!r}"
         A = np.zeros((3, 3)) if quadratic is None else _numbers(quadratic, f"A {what}")
         slopes = np.zeros(3) if linear is None else _numbers(linear, f"b {what}")
         return self._declare(declared | {"quadratic": A, "linear": slopes, "constant": one_number(constant, f"c {what}")})
 
-    def add_curve(self, b: Any, a: Any, curve: Any, parameters: Any, closed: Any, name: str | None) -> Loop:
-        """A curve for a point: see `Multibody.add_curve`. A `Curve` is taken as it is."""
+    def add_curve(self, b: Any, a: Any, curve: Any, parameters: Any, closed: Any, name: str | None, ends: Any = "not-a-knot") -> Loop:
+        """Add a curve for a point: see `Multibody.add_curve`. A `Curve` is used as it is."""
         declared = self._ends(a, b, name) | {"kind": "curve"}
         what = f"loop {declared['name']!r}"
-        found = checked(curve, what) if isinstance(curve, Curve) else curve_of(curve, parameters, closed, what)
+        found = checked(curve, what) if isinstance(curve, Curve) else curve_of(curve, parameters, closed, what, ends)
         return self._declare(declared | found._asdict())
 
     def add_coupling(self, coordinates: Any, constant: Any, function: Relation | None, name: str | None) -> Loop:
-        """A relation of coordinates: see `Multibody.add_coupling`."""
+        """Add a relation of coordinates: see `Multibody.add_coupling`."""
         name = name_of(name, "a coupling", "coupling")
         if function is None and not isinstance(coordinates, Mapping):
             raise _core.ModelError(f"coupling {name!r}: coefficients by coordinate, {{'a': 1.0, 'b': -2.0}}, or coordinates and function=")
@@ -310,7 +311,7 @@ class Loops(Closed, Mapping):
         return {"name": name_of(name, "a loop", f"{a or 'base'} to {b or 'base'}"), "a": a, "b": b}
 
     def _declare(self, declared: Mapping[str, Any]) -> Loop:
-        """The loop that plain data tells of, as `_description` has it."""
+        """Return the loop of plain data, as in `_description`."""
         name, kind = declared["name"], declared["kind"]
         if kind == "coupling":
             self._core.add_coupling(name, declared["terms"], declared["constant"], declared["function"])
@@ -346,9 +347,9 @@ class Loops(Closed, Mapping):
     def __repr__(self) -> str:
         return f"<loops of {self._model.name!r}: {', '.join(map(repr, self)) or 'none'}>"
 
-    # ------------------------------------------------------------------ what they share
+    # ------------------------------------------------------------------ common parts
     def _place(self, name: str) -> tuple[int, Sequence[int]]:
-        """A loop's number, and where the rows of each begin."""
+        """Return a loop's number, and the first row of each."""
         places, first = self.numbered()
         try:
             return places[name], first
@@ -356,7 +357,7 @@ class Loops(Closed, Mapping):
             raise _core.ModelError(f"{self._model.name!r} has no loop called {name!r} any more") from None
 
     def _frame(self, frame: Any) -> str:
-        """The name of a body or node of this model, "" of the base."""
+        """Return the name of a body or node of this model, "" for the base."""
         if isinstance(frame, (Body, Node)):
             if frame._model is not self._model:
                 raise _core.ModelError(f"frame {frame.name!r} belongs to another model, {frame._model.name!r}, not to {self._model.name!r}")
@@ -370,23 +371,23 @@ class Loops(Closed, Mapping):
         return found[0]
 
     def _of_hinge(self, number: int) -> tuple[str, int]:
-        """Whose coordinate that is, and which of its own."""
+        """Return the hinge of a coordinate, and its number within the hinge."""
         model = self._model
 
         def first(body: int) -> int:
             return model._slices(body)[1].start
 
-        body = bisect_right(range(model._size), number, key=first) - 1  # the last that begins there or before: no weld does
+        body = bisect_right(range(model._size), number, key=first) - 1  # the last that begins there or before; welds have no coordinates
         return model._body(body)["hinge"]["name"], number - first(body)
 
     def _stands_on(self, name: str) -> set[str]:
-        """What a loop was declared on: bodies, nodes and hinges by name, "" for the base."""
+        """Return the names on which a loop was declared: bodies, nodes and hinges, "" for the base."""
         declared = self._declared[name]
         declared = declared.get("whole", declared)
         return {hinge for hinge, _, _ in declared["terms"]} if "terms" in declared else {declared["a"], declared["b"]}
 
     def _held(self, locked: Mapping[str, np.ndarray]) -> dict[str, dict[str, Any]]:
-        """Couplings that change where these hinges, and no others, are locked at these coordinates: as they are declared then."""
+        """Return new declarations of couplings that change if exactly these hinges are locked at these coordinates."""
         changed = {}
         for name, declared in self._declared.items():
             if "terms" in declared and ("whole" in declared or any(hinge in locked for hinge, *_ in declared["terms"])):
@@ -394,7 +395,7 @@ class Loops(Closed, Mapping):
         return changed
 
     def _declare_anew(self, changed: Mapping[str, Mapping[str, Any]]) -> None:
-        """These as they are given, all in the order in which they are."""
+        """Declare these anew, with all loops in their present order."""
         if changed:
             before = self._description()
             for loop in before:
@@ -403,7 +404,7 @@ class Loops(Closed, Mapping):
                 self._declare(changed.get(loop["name"], loop))
 
     def _turned(self, hinges: Mapping[str, int]) -> None:
-        """Couplings follow the coordinates of hinges of so many that have them in the other order now; the loops' order stays."""
+        """Adapt couplings to hinges with reversed coordinates, given with their counts; the order of loops stays."""
         before = self._description()
         if not any(hinges.get(hinge, 1) > 1 for loop in before for hinge, *_ in loop.get("terms", ())):
             return
@@ -414,7 +415,7 @@ class Loops(Closed, Mapping):
             self._declare(loop | ({"terms": terms} if terms else {}))
 
     def _description(self) -> list[dict[str, Any]]:
-        """The loops as plain data (functions of couplings as they are), in order."""
+        """Return the loops as plain data (functions of couplings as they are), in order."""
         return [dict(self._declared[name]) for name in self]
 
 
@@ -423,7 +424,7 @@ def _numbers(given: Any, what: str) -> np.ndarray:
 
 
 def _subhinge(given: Any, what: str) -> Any:
-    """A copy of what a subhinge is given by, lists as tuples; the core says what is wrong with it."""
+    """Return a copy of a subhinge's data, lists as tuples; the core reports faults."""
     if not isinstance(given, Mapping):
         return given
     return {
@@ -432,7 +433,7 @@ def _subhinge(given: Any, what: str) -> Any:
 
 
 def _coefficients(given: Any, what: str) -> list[float]:
-    """Of 1, q, q², ...; a number alone is that of q."""
+    """Return the coefficients of 1, q, q², ...; a scalar is the coefficient of q."""
     numbers = _core.real_array(given, what)
     if numbers.ndim > 1:
         raise _core.ModelError(f"{what}: one number, or those of 1, q, q², ..., not an array {numbers.shape}")

@@ -1,4 +1,4 @@
-"""What loops leave free at a state, which rows say nothing of their own, how far it is to where that changes (docs/loops.md)."""
+"""Freedoms left by loops at a state, redundant rows, and the distance to singular states (docs/loops.md)."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from ..arguments import one_number
 from ..closed import Closed
 from ..state import at_state
 
-_CLOSED = 1e-6  # of residuals by the sizes of rows: above is no state on the loops
+_CLOSED = 1e-6  # of residuals relative to the sizes of rows: larger ones mean that a state is off the loops
 _NEIGHBOURS, _STEP = 4, 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Mobility(Closed):
-    """What loops leave free at a state.
+    """Freedoms left by loops at a state.
 
     degrees_of_freedom : nv - rank
-    rank : of Q, scaled by the length of its longest row
-    generic_rank : the largest at neighbouring states on the loops; where it is larger than `rank` this state is `singular`
-    redundant : rows that follow from the others, by name; which of several are named is the choice of a pivoted factor
-    dependencies : {redundant row: {row: c}}, with which Q[redundant] = Σ c Q[row]; none of a row that asks nothing here
-    lost : rows, by name, that are independent at neighbouring states and not here, with their share
-    singular_values : of the scaled Q, from the largest
-    distance : the smallest of them above the tolerance; inf where there are none. It goes to zero where a singular state is ahead
+    rank : rank of Q, scaled by the length of its longest row
+    generic_rank : the largest at neighbouring states on the loops; if it exceeds `rank` this state is `singular`
+    redundant : rows that follow from the others, by name; the choice among several comes from a pivoted factorization
+    dependencies : {redundant row: {row: c}}, with which Q[redundant] = Σ c Q[row]; none for a row that constrains nothing here
+    lost : rows, by name, that are independent at neighbouring states but not here, with their share
+    singular_values : singular values of the scaled Q, in descending order
+    distance : the smallest of them above the tolerance; inf if there are none. It approaches zero near a singular state
     freedoms : (nv, degrees of freedom), orthonormal velocities that keep all rows
     """
 
@@ -43,7 +43,7 @@ class Mobility(Closed):
 
     @property
     def singular(self) -> bool:
-        """Whether the rank is smaller here than at neighbouring states."""
+        """True if the rank is smaller here than at neighbouring states."""
         return self.generic_rank > self.rank
 
     def __str__(self) -> str:
@@ -59,7 +59,7 @@ class Mobility(Closed):
 
 
 def scaled(Q: np.ndarray) -> np.ndarray:
-    """Q by the length of its longest row: not each by its own, or a row that is about to vanish would not be seen to."""
+    """Return Q over the length of its longest row: scaling each row by its own length would hide a row that is about to vanish."""
     longest = np.linalg.norm(Q, axis=1).max(initial=0)
     return Q / longest if longest else Q
 
@@ -69,18 +69,18 @@ def _rank(values: np.ndarray, tolerance: float) -> int:
 
 
 def check_closed(model: Any, q: np.ndarray) -> None:
-    """ModelError where a state, or one of a batch, is not on the loops: with the row that is most off."""
+    """Raise ModelError for a state, or one of a batch, that is not on the loops: with the worst row."""
     rows, residual = model.loops.rows, np.abs(model.loops.residual(q))
     off = residual / model.loops.sizes(q)
     if off.max(initial=0) > _CLOSED:
         *sample, worst = np.unravel_index(int(off.argmax()), off.shape)
         where = f" at sample {sample[0]}" if sample else ""
-        said = f"{rows[worst]!r} is off by {residual.flat[off.argmax()]:.3g}; mobility is asked at states of assemble()"
+        said = f"{rows[worst]!r} is off by {residual.flat[off.argmax()]:.3g}; mobility needs a state on the loops (assemble())"
         raise _core.ModelError(f"{model.name!r} is not on its loops{where}: {said}")
 
 
 def checked_tolerance(tolerance: Any) -> float:
-    """Of singular values over the longest row. ModelError where it is not between 0 and 1."""
+    """Return a tolerance for singular values relative to the longest row. ModelError unless it is between 0 and 1."""
     checked = one_number(tolerance, "tolerance")
     if not 0 < checked < 1:
         raise _core.ModelError(f"tolerance: between 0 and 1, of singular values over the longest row, not {checked!r}")
@@ -92,7 +92,7 @@ def mobility(model: Any, q: Any, tolerance: Any) -> Mobility:
     q = np.array(_core.real_array(at_state(model, q)[0], "q"))
     tolerance = checked_tolerance(tolerance)
     if q.ndim != 1:
-        raise _core.ModelError(f"mobility is that of one state, not of an array {q.shape}; mobility_along is of many")
+        raise _core.ModelError(f"mobility takes one state, not an array {q.shape}; mobility_along takes many")
     check_closed(model, q)
     loops, rows = model.loops, model.loops.rows
     Q = scaled(loops.jacobian(q))
@@ -115,13 +115,13 @@ def mobility(model: Any, q: Any, tolerance: Any) -> Mobility:
 
 
 def _upward(columns: np.ndarray) -> np.ndarray:
-    """Each with its largest entry positive, so that neighbouring states have neighbouring freedoms where there is one."""
+    """Return the columns, each with its largest entry positive, so that freedoms vary continuously between neighbouring states."""
     largest = np.take_along_axis(columns, np.abs(columns).argmax(axis=0)[None], axis=0) if columns.size else np.ones((1, columns.shape[1]))
     return columns * np.sign(largest)
 
 
 def _dependencies(Q: np.ndarray, rank: int, rows: list[str]) -> tuple[list[str], dict[str, dict[str, float]]]:
-    """Q*Π = q [R₁₁ R₁₂] by Householder reflections with column pivoting: a redundant row is R₁₁⁻¹R₁₂ of those that were taken."""
+    """Q*Π = q [R₁₁ R₁₂] by Householder reflections with column pivoting: a redundant row is R₁₁⁻¹R₁₂ of the pivot rows."""
     from scipy.linalg import qr, solve_triangular  # SciPy takes a quarter of a second to import
 
     if not Q.size:
@@ -139,7 +139,7 @@ def _dependencies(Q: np.ndarray, rank: int, rows: list[str]) -> tuple[list[str],
 
 
 def _neighbours(model: Any, q: np.ndarray, rank: int, null: np.ndarray, freedoms: np.ndarray, tolerance: float) -> tuple[int, np.ndarray]:
-    """The largest rank at states on the loops a step away, and how much each row has in what is independent there and not here."""
+    """Return the largest rank at states on the loops a step away, and each row's share in the combinations independent only there."""
     from .assembly import Assembler
 
     generic, lost = rank, np.zeros(len(null))
@@ -159,6 +159,6 @@ def _neighbours(model: Any, q: np.ndarray, rank: int, null: np.ndarray, freedoms
 
 
 def shares(null: np.ndarray, null_there: np.ndarray, count: int) -> np.ndarray:
-    """How much each row has in the `count` combinations of rows that vanish here and least there."""
+    """Return each row's share in the `count` combinations of rows that vanish here and least there."""
     vectors, _, _ = np.linalg.svd(null - null_there @ (null_there.T @ null), full_matrices=False)
     return np.linalg.norm(vectors[:, :count], axis=1)

@@ -14,17 +14,17 @@ from .assembly import Assembler, between, turns_of
 from .mobility import check_closed, checked_tolerance, mobility, scaled, shares
 
 _WIDTH = 1e-12  # of the last bracket, in samples
-_FLAT = 1e-9  # what distances over a bracket differ by where there is nothing to search: a single row's, gears', is 1 everywhere
+_FLAT = 1e-9  # distances over a bracket that differ by less need no search: for a single row, as of gears, it is 1 everywhere
 
 
 @dataclass(frozen=True, eq=False)
 class SingularState(Closed):
-    """A state of a motion where rows that are independent beside it are not.
+    """A state of a motion with dependent rows that are independent beside it.
 
-    at : where, in samples: 2.5 is halfway between the third and the fourth
+    at : its position, in samples: 2.5 is halfway between the third and the fourth
     q : (nq,), on the loops
-    distance : the singular value of Q, over its longest row, that vanishes; rounding
-    lost : rows, by name, that are independent beside it and not here, with their share
+    distance : the singular value of Q, relative to its longest row, that vanishes; rounding
+    lost : rows, by name, that are independent beside it but not here, with their share
     """
 
     at: float
@@ -39,13 +39,13 @@ class SingularState(Closed):
 
 @dataclass(frozen=True, eq=False)
 class MobilityAlong(Closed):
-    """What loops leave free along a motion.
+    """Freedoms left by loops along a motion.
 
     generic_rank : the largest rank of Q at the samples and beside the first
     rank, degrees_of_freedom : (B,), at each sample
-    singular_values : (B, rows), of Q over the length of its longest row, from the largest
-    distance : (B,), the one of these that is the smallest where the rank is generic; zero where a sample is singular, inf without rows
-    singular_states : the states between or on the samples where it reaches zero, in order; the first of several samples that all are such
+    singular_values : (B, rows), of Q over the length of its longest row, in descending order
+    distance : (B,), the smallest of these if the rank is generic; zero at a singular sample, inf without rows
+    singular_states : the states between or on the samples where it reaches zero, in order; of consecutive singular samples the first
     """
 
     generic_rank: int
@@ -61,14 +61,14 @@ class MobilityAlong(Closed):
 
 
 class _Motion:
-    """The states between samples on the loops, and the singular value that is to vanish."""
+    """States on the loops between samples, and the singular value that vanishes."""
 
     def __init__(self, model: Any, q: np.ndarray, rank: int):
         self.model, self.q, self.rank, self.turns = model, q, rank, turns_of(model)
         self.assembler = Assembler(model, q[0], (), 1e-10)
 
     def at(self, s: float) -> np.ndarray:
-        """The state at s, in samples: along the way from one to the next, brought back onto the loops. ModelError where it is not."""
+        """Return the state at s, in samples: interpolated between neighbours, projected onto the loops. ModelError if that fails."""
         i = min(int(s), len(self.q) - 2)
         if s in (i, i + 1):
             return self.q[round(s)]
@@ -81,11 +81,12 @@ class _Motion:
         return found
 
     def distance(self, s: float) -> float:
-        """The smallest singular value at s where the rank is generic."""
+        """Return the smallest singular value at s if the rank is generic."""
         return float(np.linalg.svd(scaled(self.model.loops.jacobian(self.at(s))), compute_uv=False)[self.rank - 1])
 
     def least(self, low: float, high: float) -> float:
-        """Where the distance is least in a bracket, by golden sections: it has a corner where it is zero, which parabolas do not follow."""
+        """Return the place of the least distance in a bracket, by golden sections: at zero it has a corner, which parabolas do not
+        follow."""
         ratio = (np.sqrt(5) - 1) / 2
         a, b = high - ratio * (high - low), low + ratio * (high - low)
         at_a, at_b = self.distance(a), self.distance(b)
@@ -105,7 +106,7 @@ class _Motion:
         return a if at_a < at_b else b
 
     def singular(self, s: float, beside: np.ndarray) -> SingularState:
-        """What is lost at s, against a state of generic rank."""
+        """Return the singular state at s with the lost rows, relative to a state of generic rank."""
         q, rows = self.at(s), self.model.loops.rows
         left, values, _ = np.linalg.svd(scaled(self.model.loops.jacobian(q)))
         there, *_ = np.linalg.svd(scaled(self.model.loops.jacobian(beside)))
@@ -120,7 +121,7 @@ def mobility_along(model: Any, q: Any, tolerance: Any) -> MobilityAlong:
     q = np.array(_core.real_array(at_state(model, q)[0], "q"))
     tolerance = checked_tolerance(tolerance)
     if q.ndim != 2:
-        raise _core.ModelError(f"mobility along a motion is of its samples (B, {model.nq}), not of an array {q.shape}")
+        raise _core.ModelError(f"mobility along a motion takes its samples (B, {model.nq}), not an array {q.shape}")
     check_closed(model, q)
     rows = len(model.loops.rows)
     Q = model.loops.jacobian(q)
@@ -133,7 +134,7 @@ def mobility_along(model: Any, q: Any, tolerance: Any) -> MobilityAlong:
     generic = max(int(rank.max()), first.generic_rank) if first else 0
     distance = values[:, generic - 1] if generic else np.full(len(q), np.inf)
     found: list[SingularState] = []
-    if first and generic and not (distance > tolerance).any():  # all of the motion is singular, and nothing of it is beside
+    if first and generic and not (distance > tolerance).any():  # the whole motion is singular
         found = [SingularState(0.0, q[0], float(distance[0]), first.lost)]
     elif generic and len(q) > 1:
         found = _found(_Motion(model, q, generic), distance, tolerance)
@@ -141,7 +142,7 @@ def mobility_along(model: Any, q: Any, tolerance: Any) -> MobilityAlong:
 
 
 def _found(motion: _Motion, distance: np.ndarray, tolerance: float) -> list[SingularState]:
-    """The singular states in the brackets about the least samples."""
+    """Return the singular states in the brackets about the least samples."""
     found: list[SingularState] = []
     last, regular = len(distance) - 1, np.flatnonzero(distance > tolerance)
     for i in range(last + 1):

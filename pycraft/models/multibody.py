@@ -40,7 +40,7 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
         "lump": a body on a weld becomes part of the body that moves it and a node with its name; "keep": it stays a body with no
         coordinates (zero rows in H). Both give the same mass matrix.
     strict : bool
-        A violated triangle inequality of an inertia is an error instead of a warning.
+        Raise an error instead of a warning for an inertia that violates the triangle inequality.
 
     Examples
     --------
@@ -96,9 +96,9 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
         point : (3,)
             The point that the axes go through; the frame's origin by default.
         pitch : float
-            Of a screw, metres per radian.
+            For a screw, metres per radian.
         subhinges : list of dicts with "kind", "axis", "point", "pitch"
-            Of a custom hinge, and of no other: any sequence of pin, slider, screw, ball, free.
+            Only for a custom hinge: any sequence of pin, slider, screw, ball, free.
         position, rotation, or placement : (3,), (3, 3), (4, 4)
             Pose of the hinge's inboard frame in the parent's frame. It must be a rotation; one accurate to six digits
             is rounded to the nearest.
@@ -106,16 +106,15 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
         rotor_inertia : float or (n,)
             Reflected inertia of rotors along the hinge's coordinates: the hinge-diagonal term J.
         limits : (lower, upper)
-            One of each a subhinge, -inf and inf where there is none. Kept for drawing random states; nothing enforces them.
+            One of each per subhinge, -inf and inf for none. Used for random states; nothing enforces them.
         hinge_name : str
-            The body's name by default.
+            Default: the body's name.
 
         Raises
         ------
         ModelError
-            A name that is taken or unknown, an axis of zero length, a pose that is none, a negative or non-finite mass, an inertia that
-            is not symmetric positive semidefinite, limits the wrong way round: names body or hinge and number, and leaves the model as
-            it was.
+            A duplicate or unknown name, an axis of zero length, an invalid pose, a negative or non-finite mass, an inertia that is not
+            symmetric positive semidefinite, limits in the wrong order: the error names body or hinge and value, and the model is unchanged.
         """
         name = text(name, "a body")
         self._check_not_a_frame(name, "body")
@@ -160,61 +159,61 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
 
     # ------------------------------------------------------------------ state
     def random_state(self, seed: int | np.random.Generator = 0) -> State:
-        """A random state: angles within ±π and travels within ±1 m (or the limits where there are), uniform rotations, v in ±1."""
+        """Return a random state: angles within ±π and travels within ±1 m (or the limits if there are any), uniform rotations, v in ±1."""
         return random_state(self, seed)
 
-    # ------------------------------------------------------------------ numbers with their errors
+    # ------------------------------------------------------------------ certified values
     def certify(self, q=None, v=None, tau=None, **options: Any) -> Any:
-        """Forward dynamics with its measured error, what rounding of q, v and tau does, condition, floor of refinement, where digits are
-        lost, and what the next rung costs: a `pycraft.accuracy.certificates.certificate.Certificate`.
+        """Return forward dynamics with its measured error, the effect of rounding q, v and tau, condition, floor of refinement, places
+        where digits are lost, and the cost of the next rung: a `pycraft.accuracy.certificates.certificate.Certificate`.
 
         Parameters
         ----------
         q, v, tau : (nq,), (nv,), (nv,), by the rule of `forward_dynamics`
-        form, refine, residual, precision : of the value that is certified, as in `forward_dynamics`
+        form, refine, residual, precision : of the certified value, as in `forward_dynamics`
         seed : int
-            Of the signs by which q, v and tau are moved, 0 or above.
+            For the signs of the perturbations of q, v and tau, 0 or above.
         seconds : float
-            Spent on each timing, 0.02 where left out.
+            Spent on each timing, default 0.02.
 
-        Raises what `forward_dynamics` raises, and ModelError for a model without coordinates. Cost: a dozen evaluations in quad
+        Raises the errors of `forward_dynamics`, and ModelError for a model without coordinates. Cost: a dozen evaluations in quad
         precision, O(N); the floor, up to 400 coordinates, O(N²).
         """
         return _core._face["certify_dynamics"](self, *at_state(self, q, v), tau, **options)
 
-    # ------------------------------------------------------------------ code of its own
+    # ------------------------------------------------------------------ generated code
     def compile(self, call: str, *, frame: str | None = None) -> Any:
-        """A direct call written out for this model as straight-line C++, built by the system's compiler and loaded.
+        """Generate straight-line C++ for a direct call of this model, compile it with the system's compiler, and load it.
 
-        Its numbers (constant frames, inertias, gravity) are folded in as they are now: later edits do not show. Libraries are kept in a
-        folder of the user's (`PYCRAFT_CACHE`), so that the same model is built once.
+        Its constants (frames, inertias, gravity) are folded in at their present values: later edits have no effect. Libraries are cached in
+        a folder of the user (`PYCRAFT_CACHE`), so that the same model is compiled once.
 
         Parameters
         ----------
         call : {"forward_dynamics", "inverse_dynamics", "bias_forces", "mass_matrix", "mass_matrix_inverse", "constrained_dynamics",
             "jacobian", "pose"}
         frame : str, optional
-            Of Jacobians and poses: a body or node by its name.
+            For Jacobians and poses: a body or node by its name.
 
         Returns
         -------
         callable
-            Of q, v, tau for forward dynamics, and for the accelerations of constrained dynamics, on the loops that there are now; of q, v,
-            vdot for inverse dynamics; of q, v for bias forces; of q for the others; each with out=, of one state or with a leading batch
-            axis. Contiguous float64 arrays take it; others, and states whose pivots may be rounding or whose results are not finite, are
-            computed as usual and raise what is usual. Its attributes: source, library, operations. Results agree with those of the call to
-            its own rounding; on loops they were put into the rows and the equations of motion, as by the call, which answers where the
-            rank of the rows is another than beside the model's own state.
+            Its arguments are q, v, tau for forward dynamics and for the accelerations of constrained dynamics, on the present loops; q, v,
+            vdot for inverse dynamics; q, v for bias forces; q for the others; each with out=, for one state or with a leading batch axis.
+            It handles contiguous float64 arrays; others, and states with pivots that may be rounding or with results that are not finite,
+            go through the ordinary call with its errors. Attributes: source, library, operations. Results agree with the call to its own
+            rounding; on loops they are substituted into the rows and the equations of motion, as in the call, which takes over if the rank
+            of the rows differs from the rank beside the model's own state.
 
         Raises
         ------
         EvaluationError
-            No C++ compiler (the variable CXX names one), another call, a model of too many operations.
+            No C++ compiler (the variable CXX names one), an unknown call, a model with too many operations.
         ModelError
-            No body or node of that name; hinges that no kernel knows (a rotor on a ball or free hinge); loops that cannot be assembled
-            beside the model's state, and those of a screw or of a function.
+            An unknown body or node; hinges that no kernel supports (a rotor on a ball or free hinge); loops that cannot be assembled beside
+            the model's state, and loops of a screw or of a function.
 
-        Cost: seconds for the compiler, once; then a third to a half of the call's own time.
+        Cost: seconds for the compiler, once; then a third to a half of the ordinary call's time.
 
         Examples
         --------
@@ -228,26 +227,26 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
 
     # ------------------------------------------------------------------ files
     def save(self, path: str | os.PathLike[str], *, state: bool = True) -> None:
-        """Write the model to a file: TOML that a person reads and writes, which `pycraft.load` reads back bit for bit, URDF or MJCF.
+        """Write the model to a file: TOML, which people can read and edit and `pycraft.load` reads back bit for bit, URDF or MJCF.
 
         Parameters
         ----------
         path : path of the file, ending in ".toml", ".urdf", or ".xml" or ".mjcf" for MJCF
-            A file that is there is replaced.
+            An existing file is replaced.
         state : bool
-            Whether q and v are written to a TOML or MJCF file, as far as they are not zero.
+            Whether to write nonzero q and v to a TOML or MJCF file.
 
         Raises
         ------
         ModelError
-            Another ending, a file that cannot be written; what URDF or MJCF does not have: hinges and bodies by name, and the remedy.
+            Another ending, a file that cannot be written; features that URDF or MJCF lack: hinges and bodies by name, and the remedy.
 
         Warns
         -----
         ModelWarning
-            What the format does not hold: gravity and a state (URDF), some loops (MJCF), some shapes (ellipsoids in URDF, meshes that
-            MuJoCo does not read in MJCF, meshes without a file of their own in URDF and TOML). What no file holds: loose frames, couplings
-            by functions, what unlocks hinges and splits bodies.
+            For anything that the format cannot hold: gravity and a state (URDF), some loops (MJCF), some shapes (ellipsoids in URDF, meshes
+            that MuJoCo does not read in MJCF, meshes without a file of their own in URDF and TOML). No format holds loose frames, couplings
+            by functions, and the data that unlock hinges and split bodies.
 
         Examples
         --------
@@ -260,13 +259,13 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
 
     # ------------------------------------------------------------------ copies
     def description(self) -> dict[str, Any]:
-        """The whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose frames,
-        loops, and what unlocks hinges and splits bodies."""
+        """Return the whole model as plain data: bodies, hinges, nodes, gravity, state (see `pycraft.reference` for the schema), loose
+        frames, loops, and the data that unlock hinges and split bodies."""
         return describe(self)
 
     @classmethod
     def from_description(cls, description: Mapping[str, Any]) -> Multibody:
-        """The model that `description()` describes. A body with no subhinges stays a body if welds are kept; parents are indices."""
+        """Return the model that `description()` describes. A body with no subhinges stays a body if welds are kept; parents are indices."""
         try:
             return cls._described(description)
         except (KeyError, IndexError, TypeError) as error:
@@ -285,7 +284,7 @@ class Multibody(Closed, Renamed, IntegrationCalls, Pictures, Parts, Planning, St
 
         def frame(number: int) -> str:
             if not -1 <= number < len(names):
-                raise _core.ModelError(f"a description of {len(names)} bodies speaks of number {number}; -1 is the base")
+                raise _core.ModelError(f"a description of {len(names)} bodies refers to number {number}; -1 is the base")
             return names[number] if number >= 0 else ""
 
         for body in data["bodies"]:
@@ -343,7 +342,7 @@ def _again(
     offers: Sequence[Offer] = (),
     not_read: Sequence[str] = (),
 ) -> Multibody:
-    """A copy of a model from its description, what its file said beside it, which nodes were added since, and its frames' t and vdot."""
+    """Return a copy of a model from its description, with the data of its file, its added nodes, and its frames' t and vdot."""
     model = Multibody.from_description(description)
     model._left_aside, model._actuators = dict(left_aside), [dict(actuator) for actuator in actuators]
     model._added_nodes, model._shapes = set(added_nodes), list(shapes)
@@ -354,7 +353,7 @@ def _again(
 
 
 def describe(model: _core.Multibody) -> dict[str, Any]:
-    """The core's model as plain data."""
+    """Return the core's model as plain data."""
     frames = getattr(model, "_kept_frames", None)
     loose = frames._description() if frames is not None else []
     loops = getattr(model, "_kept_loops", None)

@@ -1,4 +1,4 @@
-"""Forces on bodies that a model's file speaks of: data beside the model, from which `pycraft.effects.from_model` makes effects."""
+"""Forces on bodies from a model's file: data beside the model, from which `pycraft.effects.from_model` makes effects."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..arguments import Fixed
 
 @dataclass(frozen=True, eq=False)
 class HeldWeight(Fixed):
-    """A part of a body that is held up against gravity.
+    """A part of a body with compensated gravity.
 
     Attributes
     ----------
     body : name of a body or node
-    mass : kg, whose weight is held
-    point : (3,) m, where it is held, in the frame of the body or node
-    g : (3,) m/s², in the world's axes, or None for the gravity that the model has later
+    mass : kg, of the compensated weight
+    point : (3,) m, of the compensating force, in the frame of the body or node
+    g : (3,) m/s², in the world's axes, or None for the model's gravity at evaluation
     """
 
     body: str
@@ -29,7 +29,7 @@ class HeldWeight(Fixed):
 
 @dataclass(frozen=True, eq=False)
 class BoxInFluid(Fixed):
-    """A box that a fluid resists: see `pycraft.effects.FluidDrag`.
+    """A box with fluid drag: see `pycraft.effects.FluidDrag`.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ Frame = str | Body | Node
 
 
 class Parts(WithOperators):
-    """Subgraphs and paths of a model, and of a part what it is a part of. One class serves both: the whole model is one of its parts."""
+    """Subgraphs and paths of a model, and the whole of a part. One class serves both: the whole model is one of its parts."""
 
     _whole: Multibody | None = None
     _left_aside: dict[str, np.ndarray]
@@ -32,7 +32,7 @@ class Parts(WithOperators):
     _offers: list[Offer]
     _not_read: list[str]
 
-    # ------------------------------------------------------------------ taking one
+    # ------------------------------------------------------------------ creation
     def subgraph(
         self,
         root: Frame | None = None,
@@ -42,34 +42,34 @@ class Parts(WithOperators):
         base: str = "fixed",
         name: str | None = None,
     ) -> Multibody:
-        """A connected set of bodies as a model of its own, the rest ignored.
+        """Return a connected set of bodies as a model, ignoring the rest.
 
-        It has whatever a model has: `bodies`, `hinges`, `soa`, every direct call, derivatives, scenes, parts of its own. Its coordinates
-        are those of its bodies, in the model's order. Its parameters and gravity are the model's, whichever of the two they are set on,
-        and so is its state, which is shared without a copy where the part's coordinates follow one another. When the model's structure
-        changes, the part is stale. A copy or pickle of it is a model of its own.
+        It has everything that a model has: `bodies`, `hinges`, `soa`, every direct call, derivatives, scenes, parts. Its coordinates are
+        those of its bodies, in the model's order. Parameters and gravity are shared with the model, whichever of the two they are set on,
+        and so is the state, without a copy if the part's coordinates are consecutive. When the model's structure changes, the part is
+        stale. A copy or pickle of it is an independent model.
 
         Parameters
         ----------
         root : body or node, by name or handle
-            That body with its hinge and all outboard of it; left out, all bodies.
+            This body with its hinge and everything outboard of it; default: all bodies.
         without : one or several
-            Bodies that are left out, with all outboard of them.
+            Bodies to exclude, with everything outboard of them.
         bodies : several
-            Instead of root and without: these. They must hang together; those on the model's base do by it.
+            The bodies themselves, instead of root and without. They must be connected; bodies on the model's base are connected by it.
         base : {"fixed", "moving"}
-            What the root hangs on, the part's base, is the frame of the body that carries it in the model (`carrier`). "fixed": it is the
-            world's frame, at rest, as of a model that was loaded alone. "moving": it is a body of the part, massless, on a free hinge,
-            first in order; its coordinates are the pose, velocity and acceleration of the carrier, taken from the model's state or given.
+            The part's base is the frame of the body that carries its root in the model (`carrier`). "fixed": it is the world's frame, at
+            rest, as for a model that was loaded alone. "moving": it is a body of the part, massless, on a free hinge, first in order; its
+            coordinates are the pose, velocity and acceleration of the carrier, taken from the model's state or given.
         name : str
-            By default the model's and the root's.
+            Default: from the names of the model and the root.
 
         Raises
         ------
         ModelError
-            An unknown body, a set that is empty or does not hang together: says which bodies are missing.
+            An unknown body, a set that is empty or not connected: names the missing bodies.
 
-        Cost: O(bodies of the model) once; a call on the part costs what it costs on the same model loaded alone.
+        Cost: O(bodies of the model) once; a call on the part costs the same as on the same model loaded alone.
 
         Examples
         --------
@@ -94,9 +94,9 @@ class Parts(WithOperators):
         return self._part_of(numbers, base, name)
 
     def path(self, a: Frame | None, b: Frame | None, *, base: str = "fixed", name: str | None = None) -> Multibody:
-        """The bodies on the way from a to b as a part: both, all between, and their closest common ancestor, which holds them together.
+        """Return the path from a to b as a part: both bodies, all between, and their closest common ancestor, which connects them.
 
-        a, b : bodies or nodes, by name or handle; None for the base. `base` and `name` as of `subgraph`. Bodies and coordinates are in
+        a, b : bodies or nodes, by name or handle; None for the base. `base` and `name` as in `subgraph`. Bodies and coordinates are in
         the model's order, inboard before outboard, whichever of the two comes first.
 
         Examples
@@ -130,7 +130,7 @@ class Parts(WithOperators):
         return part
 
     def _take_aside(self, whole: Any) -> None:
-        """What the whole's file says beside the model, as far as it is of these bodies."""
+        """Take over the data of the whole's file on these bodies."""
         aside: dict[str, np.ndarray] = {}
         for key, values in whole._left_aside.items():
             if key == "gravity":
@@ -146,21 +146,21 @@ class Parts(WithOperators):
         self._offers, self._not_read = [offer for offer in whole._offers if offer.body in here], list(whole._not_read)
         self._actuators = [dict(actuator) for actuator in whole._actuators if actuator["coordinate"] in own]
 
-    # ------------------------------------------------------------------ being one
+    # ------------------------------------------------------------------ relation to the whole
     @property
     def whole(self) -> Multibody | None:
-        """The model that this is a part of; None for a model of its own."""
+        """The whole model of a part; None for an independent model."""
         return self._whole
 
     @property
     def carrier(self) -> Body | None:
-        """Of a part: the body of the whole that its root hangs on; None for the base of the whole."""
+        """For a part: the body of the whole that carries its root; None for the base of the whole."""
         number = -1 if self._part is None else self._part["carrier"]
         return None if self._whole is None or number < 0 else Body(self._whole, self._whole._body(number)["name"])
 
     @property
     def moving_base(self) -> Body | None:
-        """Of a part with base="moving": the massless body on a free hinge that stands for the carrier; else None."""
+        """For a part with base="moving": the massless body on a free hinge that represents the carrier; else None."""
         return Body(self, self._body(0)["name"]) if self._moves else None
 
     @property
@@ -169,32 +169,32 @@ class Parts(WithOperators):
 
     @property
     def q_index(self) -> np.ndarray:
-        """Where the coordinates q of the part's bodies stand in the whole's, those of a moving base left out."""
+        """Indices in the whole's q of the coordinates of the part's bodies, without a moving base."""
         return _numbers(self._runs("q"))
 
     @property
     def v_index(self) -> np.ndarray:
-        """Where the velocities of the part's bodies stand in the whole's, those of a moving base left out: rows and columns of its ℳ."""
+        """Indices in the whole's v of the velocities of the part's bodies, without a moving base: rows and columns of its ℳ."""
         return _numbers(self._runs("v"))
 
     def _runs(self, which: str) -> list[tuple[int, int]]:
         part = self._part
         return [(0, self.nq if which == "q" else self.nv)] if part is None else part[f"{which}_runs"]
 
-    # ------------------------------------------------------------------ states of the whole as its own
+    # ------------------------------------------------------------------ states from the states of the whole
     def q_of(self, whole_q: Any = None) -> np.ndarray:
-        """The part's coordinates of the whole's: (nq,) or (B, nq), a view where they follow one another there, else a copy.
+        """Return the part's coordinates from the whole's: (nq,) or (B, nq), a view if they are consecutive there, else a copy.
 
-        whole_q : array or State of the whole; its present state where left out. A moving base has the carrier's pose.
+        whole_q : array or State of the whole; default: its present state. A moving base gets the carrier's pose.
         """
         return self.state_of(whole_q).q
 
     def v_of(self, whole_v: Any, whole_q: Any = None) -> np.ndarray:
-        """The part's velocities of the whole's, as `q_of`; whole_q is read where the base moves, the present one where left out."""
+        """Return the part's velocities from the whole's, as `q_of`; whole_q is used for a moving base, default: the present one."""
         return self.state_of(self._of_whole().q if whole_q is None else whole_q, whole_v).v
 
     def state_of(self, whole_q: Any = None, whole_v: Any = None) -> State:
-        """The part's state of the whole's: q and v, or a State, of one state or of a batch. Views where they can be.
+        """Return the part's state from the whole's: q and v, or a State, for one state or a batch. Views if possible.
 
         Examples
         --------
@@ -215,10 +215,10 @@ class Parts(WithOperators):
         return State(_after(pose, own_q), _after(velocity, own_v))
 
     def accelerations_of(self, whole_vdot: Any, whole_q: Any = None, whole_v: Any = None) -> np.ndarray:
-        """The part's accelerations of the whole's: those of its bodies' coordinates, and before them the carrier's where the base moves.
+        """Return the part's accelerations from the whole's: those of its bodies' coordinates, preceded by the carrier's if the base moves.
 
-        With them `part.inverse_dynamics(part.state_of(q, v), vdot=part.accelerations_of(vdot, q, v))` of a part on a moving base has the
-        forces that the whole has at these hinges, as far as they come from bodies of the part, and before them what carries the part.
+        With them `part.inverse_dynamics(part.state_of(q, v), vdot=part.accelerations_of(vdot, q, v))` for a part on a moving base gives the
+        forces of the whole at these hinges due to bodies of the part, preceded by the force that carries the part.
         """
         whole = self._of_whole()
         vdot = _core.real_array(whole_vdot, "vdot")
@@ -228,7 +228,7 @@ class Parts(WithOperators):
         return _after(self._motion_of_base(*self._state_of_whole(whole_q, whole_v), vdot)[2], own)
 
     def follow_base(self) -> None:
-        """A moving base has the carrier's motion again, after `q` or `v` was set here, which gave it one of its own."""
+        """Restore the carrier's motion to a moving base, after `q` or `v` was set here, which gave it a motion of its own."""
         self._follow_base()
 
     def _of_whole(self) -> Any:
@@ -239,7 +239,7 @@ class Parts(WithOperators):
         return _core.real_array(q, "q"), _core.real_array(v, "v")
 
     def _motion_of_base(self, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pose as a free hinge has it, velocity and acceleration of the carrier in its axes."""
+        """Return the carrier's pose in the coordinates of a free hinge, its velocity and acceleration in its axes."""
         carrier, whole = self.carrier, self._of_whole()
         if carrier is None:
             return np.r_[1.0, np.zeros(6)], np.zeros(6), np.zeros(6)
@@ -262,7 +262,7 @@ def _numbers(runs: Sequence[tuple[int, int]]) -> np.ndarray:
 
 def _taken(numbers: np.ndarray, runs: Sequence[tuple[int, int]], width: int, what: str) -> np.ndarray:
     if numbers.ndim not in (1, 2) or numbers.shape[-1] != width:
-        raise _core.ModelError(f"{what} takes {width} numbers a state, (..., {width}), not an array of shape {numbers.shape}")
+        raise _core.ModelError(f"{what} takes {width} values per state, (..., {width}), not an array of shape {numbers.shape}")
     if len(runs) == 1:
         first, size = runs[0]
         return numbers[..., first : first + size]
@@ -270,13 +270,13 @@ def _taken(numbers: np.ndarray, runs: Sequence[tuple[int, int]], width: int, wha
 
 
 def _after(base: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """What is a moving base's and then the bodies', of one state or of as many as either has."""
+    """Concatenate entries of a moving base and of the bodies, for one state or for the larger number of states."""
     states = np.broadcast_shapes(base.shape[:-1], own.shape[:-1])
     return np.concatenate([np.broadcast_to(x, (*states, x.shape[-1])) for x in (base, own)], axis=-1)
 
 
 def _quaternions(R: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4), w first and not negative, of rotations (..., 3, 3), by the largest component."""
+    """Return unit quaternions (..., 4), w first and not negative, from rotations (..., 3, 3), by the largest component."""
     x, y, z = R[..., 0, :], R[..., 1, :], R[..., 2, :]
     turn = (z[..., 1] - y[..., 2], x[..., 2] - z[..., 0], y[..., 0] - x[..., 1])
     xy, xz, yz = x[..., 1] + y[..., 0], x[..., 2] + z[..., 0], y[..., 2] + z[..., 1]

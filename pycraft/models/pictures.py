@@ -1,4 +1,4 @@
-"""How a model looks: its tree as text, and as figures of sticks that the rooms above draw, still or live."""
+"""Pictures of a model: its tree as text, and stick figures that higher layers draw, static or live."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .tree_diagram import TreeDiagram, tree_diagram
 
 
 class Pictures:
-    """What is printed and drawn of a model."""
+    """Text and pictures of a model."""
 
     _shapes: list[Shape]
 
@@ -18,20 +18,20 @@ class Pictures:
         return str(_core._face["model_html"](self))
 
     def tree(self, most: int | None = 200, *, nodes: bool = False) -> TreeDiagram:
-        """The tree as text in 80 columns: each body below and right of the one that carries it, its hinge, and its places in q and v.
+        """Return the tree as text in 80 columns: each body below and right of its carrier, its hinge, and its places in q and v.
 
         Parameters
         ----------
         most : int or None
-            Lines of bodies that are shown; the middle of a longer tree is left out. None: all.
+            Number of lines of bodies; the middle of a longer tree is omitted. None: all.
         nodes : bool
-            Whether nodes have lines.
+            Whether to show nodes.
 
         Returns
         -------
         TreeDiagram
-            Text when it is printed. A tree of more than a dozen levels does not indent only children. Names of hinges are left out where
-            there is no room for them, and not repeated where they are their bodies'.
+            Text when it is printed. A tree of more than a dozen levels does not indent only children. Names of hinges are omitted if they
+            do not fit, and not repeated if they equal their bodies'.
 
         Examples
         --------
@@ -57,23 +57,24 @@ class Pictures:
         shadow: bool = True,
         alpha: float = 1.0,
     ) -> Any:
-        """A stick figure of the model at a state, by Matplotlib alone: no mesh is needed.
+        """Draw a stick figure of the model at a state, by Matplotlib alone: no mesh is needed.
 
-        Bones go from hinge to hinge; of a body that carries no other, to its nodes, or else to where a uniform rod of its mass and second
-        moment ends. Markers tell the kinds of hinges, lines through them their axes, dashed lines what has slid. Equal scales, metres.
+        Bones connect hinges; a body without children has bones to its nodes, or else to the end of a uniform rod of its mass and second
+        moment. Markers show the kinds of hinges, lines through them their axes, dashed lines displacements of sliders. Equal scales,
+        metres.
 
         Parameters
         ----------
-        q : (nq,) or a State; the model's own where left out
+        q : (nq,) or a State; default: the model's own
         ax : Axes of Matplotlib, in space or in the plane
-            New ones where left out. What they show already stays in view, so that several states can be laid over each other.
+            Default: new ones. Their contents stay in view, so that several states can be overlaid.
         view : {"auto", "3d", "xy", "xz", "yz"}
-            "auto": the plane that a flat model never leaves, space for any other.
+            "auto": the plane of a flat model, space for any other.
         com : bool
-            Centres of mass: of each body, its area by its mass, and of all.
+            Centres of mass: of each body, with area by its mass, and of all.
         names : bool
             Of the hinges, beside them.
-        legend, shadow, alpha : what markers mean; the shadow of the bones on the floor, in space; opacity
+        legend, shadow, alpha : a legend of the markers; the shadow of the bones on the floor, in space; opacity
 
         Returns
         -------
@@ -82,9 +83,9 @@ class Pictures:
         Raises
         ------
         ModelError
-            A q that is none of this model's.
+            A q that does not fit this model.
         EvaluationError
-            Another view, or one that does not fit the axes.
+            Another view, or one that does not match the axes.
 
         `pycraft.view.StickFigure` is the same figure as an object that can be moved to another state, for animations.
 
@@ -99,14 +100,14 @@ class Pictures:
         return _core._face["plot_model"](self, q, ax, **options)
 
     def dof_shares(self, q=None) -> Any:
-        """Each body's share of the degrees of freedom, tr(Υ(k)M(k)), as numbers and as colour on the robot. O(N); with rotors O(N²).
+        """Return each body's share of the degrees of freedom, tr(Υ(k)M(k)), as values and as colour on the robot. O(N); with rotors O(N²).
 
-        The shares of bodies, and those of rotors tr(ℳ⁻¹(k,k)J(k)), add up to the number of coordinates N. Loops are not looked at: they are
-        the tree's shares.
+        The shares of bodies, and of rotors tr(ℳ⁻¹(k,k)J(k)), add up to the number of coordinates N. Loops are ignored: the shares belong
+        to the tree.
 
         Parameters
         ----------
-        q : (nq,) or a State; the model's own where left out
+        q : (nq,) or a State; default: the model's own
 
         Returns
         -------
@@ -117,7 +118,7 @@ class Pictures:
         Raises
         ------
         ModelError
-            A q that is none of this model's.
+            A q that does not fit this model.
         SingularHingeError
             A hinge that moves without inertia.
 
@@ -138,11 +139,10 @@ class Pictures:
 
     @property
     def shapes(self) -> list[Shape]:
-        """The shapes by which the model's file shows its bodies, in the file's order; none for a model that was not loaded.
+        """The shapes that display the bodies in the model's file, in the file's order; empty for a model that was not loaded.
 
-        Visuals of a URDF or SDF file, geoms of the groups 0 to 2 of an MJCF file, `[[shapes]]` of a TOML file. The viewer and pages of
-        runs draw them, and read meshes then (extra `meshes`). `Multibody.save` writes them; meshes that were in an MJCF file itself go
-        into none.
+        Visuals of a URDF or SDF file, geoms of the groups 0 to 2 of an MJCF file, `[[shapes]]` of a TOML file. The viewer and pages of runs
+        draw them, and read meshes then (extra `meshes`). `Multibody.save` writes them, except meshes that were embedded in an MJCF file.
 
         Examples
         --------
@@ -154,33 +154,34 @@ class Pictures:
 
     @property
     def collision_shapes(self) -> list[Shape]:
-        """The shapes by which the model's file lets its bodies touch, in the file's order; none for a model that was not loaded.
+        """The collision shapes of the model's file, in the file's order; empty for a model that was not loaded.
 
         Collisions of a URDF or SDF file, geoms of an MJCF file that collide. No dynamics uses them; `Multibody.save` writes them.
         """
         return [shape for shape in self._shapes if shape.purpose == "collision"]
 
     def rerootings(self, q=None, v=None) -> Any:
-        """The same motion seen from every base body in turn: a page with a slider for the base, and what changes with it and what stays.
+        """Return a page of the same motion seen from every base body in turn, with a slider for the base, showing what changes and what
+        stays.
 
-        The tree, coordinates and P(k) belong to the base that was chosen; poses, velocities, accelerations, energy, momentum, ln det ℳ
-        and Υ(k) do not: a body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k), of which the base decides what is outboard. Loops are not
-        looked at: all numbers are the tree's.
+        The tree, coordinates and P(k) depend on the chosen base; poses, velocities, accelerations, energy, momentum, ln det ℳ and Υ(k) do
+        not: the inertia felt at a body of a free tree is Υ(k)⁻¹ = P(k) + S⁺(k), and the base determines what is outboard. Loops are
+        ignored: all values belong to the tree.
 
         Parameters
         ----------
-        q, v : (nq,), (nv,), or a State; the model's own where left out
+        q, v : (nq,), (nv,), or a State; default: the model's own
 
         Returns
         -------
         RerootingPage
-            A notebook shows it; `save("bases.html")` writes a page that opens offline; `stays` and `changes` are its numbers. O(N²):
-            every body is made the base of a copy, by `reroot`; O(N⁴) for the condition numbers.
+            A notebook shows it; `save("bases.html")` writes a page that opens offline; `stays` and `changes` hold its values. O(N²): every
+            body becomes the base of a copy, by `reroot`; O(N⁴) for the condition numbers.
 
         Raises
         ------
         ModelError
-            A tree whose root is not on a free hinge, and what else `reroot` refuses; a q or v that is none of this model's.
+            A tree with a root that is not on a free hinge, and the errors of `reroot`; a q or v that does not fit this model.
         EvaluationError
             More than 60 bodies.
 
@@ -195,12 +196,12 @@ class Pictures:
         return _core._face["rerootings"](self, q, v)
 
     def view(self, q=None, v=None, *, host: str = "127.0.0.1", port: int = 0) -> Any:
-        """The model in a live viewer: `Scene.view` of a scene that has nothing but the model's own gravity, if it has one.
+        """Open the model in a live viewer: `Scene.view` of a scene with only the model's own gravity, if it has one.
 
         Parameters
         ----------
-        q, v : (nq,), (nv,), or a State; the model's own where left out
-        host, port : as `Scene.view` takes them
+        q, v : (nq,), (nv,), or a State; default: the model's own
+        host, port : as in `Scene.view`
 
         Returns
         -------
@@ -209,9 +210,9 @@ class Pictures:
         Raises
         ------
         ModelError
-            A q or v that is none of this model's.
+            A q or v that does not fit this model.
         EvaluationError
-            A port that is taken, a host that is none.
+            A port that is in use, an invalid host.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""What planning asks of a model: a neutral configuration, limits, configurations at which frames are where they are wanted."""
+"""Planning calls of a model: a neutral configuration, limits, inverse kinematics."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class Planning(WithOperators):
     """Neutral configuration, distances to limits, inverse kinematics."""
 
     def neutral(self, batch: int | None = None) -> np.ndarray:
-        """The configuration with all coordinates zero and quaternions (1, 0, 0, 0): (nq,), or (batch, nq).
+        """Return the configuration with all coordinates zero and quaternions (1, 0, 0, 0): (nq,), or (batch, nq).
 
-        Every hinge's outboard frame is then its inboard one. Limits are not looked at (`clamped` moves a configuration inside), as of the
-        configuration of that name in Pinocchio.
+        Every hinge's outboard frame then coincides with its inboard one. Limits are ignored (`clamped` moves a configuration inside), as in
+        the function of that name in Pinocchio.
 
         Examples
         --------
@@ -34,9 +34,9 @@ class Planning(WithOperators):
         return np.tile(self.zero_q(), (batch, 1))
 
     def distance_to_limits(self, q=None) -> LimitDistances:
-        """How far every coordinate is from its limits, rad or m: negative outside, inf where there is none. O(N).
+        """Return the distance of every coordinate from its limits, rad or m: negative outside, inf without a limit. O(N).
 
-        q : (nq,) or (B, nq), or a State; the present configuration where left out. Balls and free hinges have no limits.
+        q : (nq,) or (B, nq), or a State; default: the present configuration. Balls and free hinges have no limits.
 
         Examples
         --------
@@ -51,7 +51,7 @@ class Planning(WithOperators):
         return LimitDistances(tuple(self.coordinate_names), values - limits.lower, limits.upper - values)
 
     def clamped(self, q=None) -> np.ndarray:
-        """The nearest configuration within limits, (nq,) or (B, nq): every coordinate outside is at its limit, exactly.
+        """Return the nearest configuration within limits, (nq,) or (B, nq): every coordinate outside is set exactly to its limit.
 
         Examples
         --------
@@ -82,12 +82,12 @@ class Planning(WithOperators):
         seed: int = 0,
         unreached: str = "answer",
     ) -> Any:
-        """A configuration at which frames are where targets want them: inverse kinematics, within limits.
+        """Find a configuration that brings frames to targets: inverse kinematics, within limits.
 
-        Damped Gauss-Newton steps on the group with exact Jacobians, limits as bounds of every step. From q0 first; where that ends in a
-        local minimum, from random configurations within limits, each descent to its end. What is reached is reached to the tolerance;
-        what is not is the best of all descents, carried on until it is stationary, and `why` says what stands in the way. Loops of the
-        model are to be closed as targets are to be reached, to the same tolerance (their rows of positions, each of weight 1).
+        Damped Gauss-Newton steps on the group with exact Jacobians, limits as bounds of every step. The search starts at q0; if it ends in
+        a local minimum, it continues from random configurations within limits, each descent to its end. Targets are reached to the
+        tolerance; otherwise the result is the best of all descents, continued until it is stationary, and `why` gives the reason. Loops of
+        the model are closed like targets, to the same tolerance (their rows of positions, each of weight 1).
 
         Parameters
         ----------
@@ -96,39 +96,40 @@ class Planning(WithOperators):
             position (3,) in the world, or a dictionary:
 
             pose, position, orientation   each with an optional leading batch axis
-            axis, along                   instead: an axis (3,) of the frame, and the direction that it is to have in `wrt`
-            wrt                           the frame in which all this is given, which may move; the base where left out
-            directions                    of "rx", "ry", "rz", "x", "y", "z" those that matter; all where left out
-            axes                          whose directions: "aligned" (of `wrt`), "target", or a third frame's
-            weight                        of what is made small, 1/rad and 1/m: a number or a pair; 1 where left out
-            tolerance                     of this target
+            axis, along                   instead: an axis (3,) of the frame, and its target direction in `wrt`
+            wrt                           the reference frame of all these, which may move; default: the base
+            directions                    the directions that count, of "rx", "ry", "rz", "x", "y", "z"; default: all
+            axes                          the axes of the directions: "aligned" (of `wrt`), "target", or a third frame's
+            weight                        weight of the residual, 1/rad and 1/m: a number or a pair; default 1
+            tolerance                     tolerance of this target
         q0 : (nq,) or (B, nq), or a State
-            Where the search begins, moved inside limits; the present configuration where left out.
+            The start of the search, moved inside limits; default: the present configuration.
         centre_of_mass : position (3,) or (B, 3), or a dictionary with position, wrt, directions, weight, tolerance
         posture : (nq,) or (B, nq)
-            What to be near to, in the null space of the targets: among configurations that reach them, a nearest one (a local minimum of
-            |`difference(q, posture)`|, free hinges left out, which have no posture).
-        coordinates : names or numbers of hinges and coordinates that may move; all where left out
+            A posture to stay near, in the null space of the targets: among configurations that reach them, a nearest one (a local minimum
+            of |`difference(q, posture)`|, ignoring free hinges, which have no posture).
+        coordinates : names or numbers of hinges and coordinates that may move; default: all
         limits : bool
-            Whether limits hold.
+            Whether to enforce limits.
         tolerance : rad and m, or a pair (rad, m)
-        iterations : of one descent; as many again, and as many of Newton's, until what is not reached is stationary
-        restarts : from how many random configurations, where that is needed
-        seed : of these
+        iterations : of one descent; as many again, and as many of Newton's, until an unreached target is stationary
+        restarts : number of random configurations, used if needed
+        seed : of these configurations
         unreached : {"answer", "raise"}
-            What to do where a target is not reached: a solution that says so, or an EvaluationError with the same words.
+            For unreached targets: return a solution that reports them, or raise an EvaluationError with the same words.
 
         Returns
         -------
-        pycraft.kinematics.Solution : q (nq,), reached, why, errors by target, coordinates at limits by name; of a batch q (B, nq) and so on
+        pycraft.kinematics.Solution : q (nq,), reached, why, errors by target, coordinates at limits by name; for a batch q (B, nq) and so
+            on
 
         Raises
         ------
         ModelError
-            Unknown frames (with the nearest name), matrices that are no rotations, numbers that are not finite, sizes that do not fit,
-            part of a ball or free subhinge among the coordinates: names the target.
+            Unknown frames (with the nearest name), invalid rotations, values that are not finite, sizes that do not match, part of a ball
+            or free subhinge among the coordinates: names the target.
 
-        Cost: O(N + nv² m) an iteration, m rows of targets; batches share the work of the interpreter.
+        Cost: O(N + nv² m) per iteration, m rows of targets; batches share the overhead of the interpreter.
 
         Source: Levenberg-Marquardt with damping by the square of the residual [T. Sugihara, Solvability-unconcerned inverse kinematics by
         the Levenberg-Marquardt method, IEEE Trans. Robotics 27 (2011)]; bounds by an active set.

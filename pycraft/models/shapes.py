@@ -1,6 +1,6 @@
-"""Shapes that a model's file gives its bodies: boxes, spheres, cylinders, capsules, ellipsoids and meshes, to be seen or to touch.
+"""Shapes of bodies from a model's file: boxes, spheres, cylinders, capsules, ellipsoids and meshes, for display or collision.
 
-They stand beside the model, as does what else its file says (`left_aside`): no dynamics uses them. Whoever draws a mesh opens its file.
+They are data beside the model, like other data of its file (`left_aside`): no dynamics uses them. Code that draws a mesh opens its file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SIZES = {
     "ellipsoid": "half axes",
     "mesh": "scales along its axes, 1 each where it is in metres",
 }
-"""Kinds, and what their sizes are, m."""
+"""Kinds, and the meaning of their sizes, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,15 +30,15 @@ class Shape(Fixed):
 
     Attributes
     ----------
-    body : name of the body or node that it is fixed on; "" the base
-    kind : of SIZES
-    size : as SIZES says, m
-    placement : (4, 4), of the shape in the frame of its body; the origin is in the middle, of a mesh its own
-    colour : "#rrggbb", or None where the file gives none
-    file : of a mesh as its model's file calls it, "package://robot/arm.stl"; "" of other kinds
-    beside : of a mesh, the path of the model's file and the folders of packages, where it is looked for
-    triangles : vertices (n, 3) and faces (m, 3) of a mesh that is in the model's file itself; None of others
-    purpose : "visual", what is seen, or "collision", what touches
+    body : name of the body or node that it is fixed on; "" for the base
+    kind : a key of SIZES
+    size : as described in SIZES, m
+    placement : (4, 4), of the shape in the frame of its body; the origin is in the middle, for a mesh its own
+    colour : "#rrggbb", or None if the file gives none
+    file : of a mesh, as in its model's file, "package://robot/arm.stl"; "" for other kinds
+    beside : of a mesh, its search path: the path of the model's file and the folders of packages
+    triangles : vertices (n, 3) and faces (m, 3) of a mesh embedded in the model's file; None for others
+    purpose : "visual", for display, or "collision", for contact
     """
 
     body: str
@@ -65,5 +65,5 @@ def renamed(things: Iterable[OnBody], bodies: set[str], called: Callable[[str], 
 
 
 def hex_colour(rgba: Any) -> str:
-    """The text "#rrggbb" of red, green and blue from 0 to 1."""
+    """Return the text "#rrggbb" of red, green and blue from 0 to 1."""
     return "#" + "".join(f"{round(255 * min(1.0, max(0.0, float(x)))):02x}" for x in rgba[:3])

@@ -1,4 +1,4 @@
-"""Relations of coordinates through points, for couplings: cams, cables on drums of any shape, what was measured (docs/loops.md)."""
+"""Relations of coordinates through points, for couplings: cams, cables on drums of any shape, measurements (docs/loops.md)."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from .. import _core
 class Spline:
     """``follower = s(driver)``, s the cubic spline through points: the `function` of a coupling of two coordinates, [driver, follower].
 
-    s has two continuous derivatives between its ends. Beyond them it goes on straight; a periodic one repeats.
+    s has two continuous derivatives between its ends. Beyond them it continues straight; a periodic one repeats.
 
     Parameters
     ----------
     driver : (n,), ascending, n at least 2
-        Coordinates of the one that drives: radians, or metres.
+        Coordinates of the driver: radians, or metres.
     follower : (n,)
-        Those of the one that follows, there.
+        Coordinates of the follower at these points.
     periodic : bool
-        The last point is the first one, a period on: of a cam, driver[-1] - driver[0] = 2π. At least three points.
-    ends : {"not-a-knot", "natural", "clamped"}; not of a periodic one
-        "not-a-knot": one cubic through the first two intervals, and one through the last two, as SciPy's CubicSpline has it. With a
-        function's own values at distance h, s is off by O(h⁴) everywhere; its curvature ends at the ends, where accelerations jump if
-        they are passed. "natural": without curvature at the ends, so that nothing jumps there; off by O(h²) near them where the
-        function has some. "clamped": without slope, off by O(h).
+        The last point equals the first one, one period later: for a cam, driver[-1] - driver[0] = 2π. At least three points.
+    ends : {"not-a-knot", "natural", "clamped"}; not for a periodic one
+        "not-a-knot": one cubic through the first two intervals, and one through the last two, as in SciPy's CubicSpline. For values of a
+        function at distance h, the error of s is O(h⁴) everywhere; its curvature stops at the ends, so that accelerations jump there.
+        "natural": without curvature at the ends, so that nothing jumps there; with an error of O(h²) near them if the function has
+        curvature there. "clamped": without slope, with an error of O(h).
 
     Raises
     ------
     ModelError
-        Arrays of other shapes, numbers that are not finite, drivers that do not ascend, ends of a periodic spline that differ.
+        Arrays of the wrong shape, values that are not finite, drivers that do not ascend, ends of a periodic spline that differ.
 
     Source: C. de Boor, A Practical Guide to Splines, Springer 2001, ch. IV, by SciPy's CubicSpline.
 
@@ -72,15 +72,15 @@ class Spline:
         except ValueError:  # of slopes that are not finite
             spline = None
         if spline is None or not np.isfinite(spline.c).all():
-            raise _core.ModelError("a spline's slopes are too large for numbers: its points are too close for what they differ by")
-        self._s, self._periodic, self._ends = spline, periodic, (float(x[0]), float(x[-1]))
+            raise _core.ModelError("a spline's slopes are too large for numbers: its points are too close for their differences")
+        self._s, self._periodic, self._kind, self._ends = spline, periodic, ends, (float(x[0]), float(x[-1]))
         self._points = x, y
 
     def __reduce__(self):
-        return partial(Spline, periodic=self._periodic), self._points  # in every protocol, as SciPy's own is not
+        return partial(Spline, periodic=self._periodic, ends=self._kind), self._points  # in every protocol, unlike SciPy's own
 
     def __call__(self, q: np.ndarray) -> tuple[float, list[float], list[list[float]]]:
-        """(r, gradient, second derivatives) of r = follower - s(driver), as `Multibody.add_coupling` wants them."""
+        """Return (r, gradient, second derivatives) of r = follower - s(driver), in the form of `Multibody.add_coupling`."""
         if len(q) != 2:
             raise _core.ModelError(f"a spline couples two coordinates, [driver, follower], not {len(q)}")
         first, last = self._ends

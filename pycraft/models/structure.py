@@ -1,4 +1,4 @@
-"""A structure that stands is changed: bodies attached, detached, hung on other hinges, and seen from another root."""
+"""Edit an existing structure: attach and detach bodies, move them to other hinges, and change the root."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Reattachment:
     ----------
     body : Body
     q, v : coordinates and velocities of the new hinge
-    pose_error, velocity_error : (6,) what they leave of the body's pose and twist, in its axes, angular first: rad and m, rad/s and m/s.
-        Of an impulse the velocity error is what the impulse took.
-    impulse : Impulse, or None where velocities were kept
+    pose_error, velocity_error : (6,) remainders of the body's pose and twist, in its axes, angular first: rad and m, rad/s and m/s. With an
+        impulse the velocity error is the velocity that the impulse removed.
+    impulse : Impulse, or None if velocities were kept
     """
 
     body: Body
@@ -40,7 +40,7 @@ class Reattachment:
 
 
 class Structure(Locking):
-    """Edits that hang bodies elsewhere. Each leaves the model as it was where it is refused, and makes operators and parts stale."""
+    """Edits that move bodies to other hinges. Each leaves the model unchanged if it is refused, and makes operators and parts stale."""
 
     _left_aside: dict[str, np.ndarray]
     _actuators: list[dict[str, Any]]
@@ -66,25 +66,25 @@ class Structure(Locking):
         velocity: str = "keep",
         tolerance: float = 1e-9,
     ) -> Reattachment:
-        """Hang a body, with all outboard of it, on another hinge of another body, or of the same, where it is and as it moves now.
+        """Move a body, with everything outboard of it, to another hinge of another body, or of the same, at its present pose and velocity.
 
-        The coordinates of the new hinge are solved for so that the body's pose stays, and its velocities so that its twist stays; of all
-        other bodies both stay then, too. Momentum and kinetic energy do not change, but for the rotors of the hinge that it leaves.
+        The coordinates of the new hinge are solved for the body's pose, and its velocities for its twist; pose and twist of all other
+        bodies do not change. Momentum and kinetic energy do not change, except for the rotors of the removed hinge.
 
         Parameters
         ----------
-        body : by its name or handle
+        body : its name or handle
         parent : name of a body or node, a Body or Node, or None for the base
-        hinge, axis, axes, point, pitch, subhinges, position, rotation, rotor_inertia, limits : the new hinge, as of `add_body`
+        hinge, axis, axes, point, pitch, subhinges, position, rotation, rotor_inertia, limits : the new hinge, as in `add_body`
         placement : (4, 4), or "here"
-            "here": the hinge's inboard frame is put where the body is at the coordinates q, zero where they are left out.
-        hinge_name : by default the name that its hinge has
-        q : (n,) coordinates of the new hinge near which they are looked for: of several that put the body there, those that the iteration
-            finds from q are taken, angles of pins by whole turns nearest to q. Zero, or the nearest limit, where left out.
+            "here": the hinge's inboard frame is placed so that the body is at the coordinates q, default zero.
+        hinge_name : default: the name of the present hinge
+        q : (n,) guess for the coordinates of the new hinge: of several solutions the one that the iteration reaches from q, with angles of
+            pins by whole turns nearest to q. Default: zero, or the nearest limit.
         velocity : {"keep", "impulse"}
-            "keep": a twist that the hinge does not permit is refused. "impulse": the body is caught by the hinge, a plastic impact that
-            changes all velocities at once. Momentum is kept along every motion of the new structure, kinetic energy falls by what
-            `Reattachment.impulse` says, ½ δ*Mδ; a rotor of the new hinge is at rest before.
+            "keep": refuse a twist that the hinge does not permit. "impulse": the hinge catches the body, a plastic impact that changes all
+            velocities at once. Momentum is conserved along every motion of the new structure, kinetic energy falls by the loss of
+            `Reattachment.impulse`, ½ δ*Mδ; a rotor of the new hinge is at rest before.
         tolerance : of the error of pose and twist, rad and rad/s; in metres and m/s times 1 + the distance, or speed
 
         Returns
@@ -94,12 +94,12 @@ class Structure(Locking):
         Raises
         ------
         ModelError
-            A body hung outboard of itself, names that are taken or unknown, a hinge that is none; a coupling of the one that is left; a
-            pose or a twist that the hinge does not have, with what is missing and the remedy. The model is as it was.
+            A body moved outboard of itself, names that are duplicate or unknown, an invalid hinge; a coupling of the removed hinge; a pose
+            or a twist that the hinge cannot produce, with the remainder and the remedy. The model is unchanged.
         SingularHingeError
-            Of an impulse, as forward dynamics.
+            For an impulse, as forward dynamics.
 
-        Cost: the hinges between the two bodies, and O(bodies) at the next look at the model (docs/structure.md); an impulse O(bodies).
+        Cost: the hinges between the two bodies, and O(bodies) at the next use of the model (docs/structure.md); an impulse O(bodies).
 
         Examples
         --------
@@ -143,19 +143,20 @@ class Structure(Locking):
         return Reattachment(Body(self, name), fit.q, v, fit.pose_error, fit.velocity_error, impulse)
 
     def attach(self, body: str | Body, parent: str | Body | Node, hinge: str = "weld", **options: Any) -> Reattachment:
-        """Join a body that flies freely to another: `reattach` by a hinge where it is now, by default a weld.
+        """Join a freely floating body to another: `reattach` by a hinge at its present place, by default a weld.
 
-        What is detached is attached again so. A body is free where it hangs on the base by a free hinge; of several bodies that fly
-        together another one is made the first by `reroot`.
+        The inverse of `detach`. A body floats freely if it is on the base by a free hinge; of several bodies that float together `reroot`
+        makes another one the first.
 
         Parameters
         ----------
-        body, parent, hinge, options : as of `reattach`, but that placement is "here" unless a pose is given
+        body, parent, hinge, options : as in `reattach`, except that placement is "here" unless a pose is given
 
         Raises
         ------
         ModelError
-            A body that is not free, and the remedy; as `reattach`, twists that differ among them: velocity="impulse" catches the body.
+            A body that is not free, with the remedy; errors of `reattach`, including twists that differ: velocity="impulse" catches the
+            body.
 
         Examples
         --------
@@ -179,10 +180,10 @@ class Structure(Locking):
         return self.reattach(name, parent, hinge, **options)
 
     def detach(self, body: str | Body, hinge_name: str | None = None) -> Reattachment:
-        """Let a body go, with all outboard of it: it hangs on the base by a free hinge, where it is and as it moves now.
+        """Release a body, with everything outboard of it, onto a free hinge on the base, at its present pose and velocity.
 
-        body : by its name or handle; hinge_name : of the free hinge, by default the name that the body's hinge has. Momentum and energy are
-        kept but for the rotors of the hinge. Cost and errors as of `reattach`.
+        body : its name or handle; hinge_name : of the free hinge, default: the name of the body's hinge. Momentum and energy are conserved
+        except for the rotors of the hinge. Cost and errors as in `reattach`.
 
         Examples
         --------
@@ -195,24 +196,24 @@ class Structure(Locking):
         return self.reattach(body, None, "free", hinge_name=hinge_name)
 
     def reroot(self, body: str | Body) -> Body:
-        """Make a body the first of a tree that flies freely: the same motion, seen from another base body.
+        """Make a body the first of a freely floating tree: the same motion, seen from another base body.
 
-        The free hinge moves to the body and has its pose and twist; hinges on the way from the old root are turned round, so that what was
-        inboard is outboard. Their subhinges are in the other order and their axes reversed: coordinates, velocities, limits, forces and
-        rotors keep their numbers. Of balls and free subhinges on the way, quaternions and positions are inverted, and velocities are those
-        of the other body, in its axes. All poses, velocities, energies and momenta are the same, to rounding, and accelerations where
-        `frames.vdot` has them. A planar hinge that is turned round is pin, slider, slider, a custom hinge. Masses, names, frames and
-        nodes of bodies stay, and couplings stay on the coordinates that they are of.
+        The free hinge moves to the body and has its pose and twist; hinges on the path from the old root are reversed, so that inboard
+        becomes outboard. The order of their subhinges and their axes are reversed: coordinates, velocities, limits, forces and rotors keep
+        their values. For balls and free subhinges on the path, quaternions and positions are inverted, and velocities belong to the
+        other body, in its axes. All poses, velocities, energies and momenta are the same, to rounding, and so are accelerations in
+        `frames.vdot`. A reversed planar hinge is pin, slider, slider, a custom hinge. Masses, names, frames and nodes of bodies stay, and
+        couplings stay on their coordinates.
 
         Raises
         ------
         ModelError
-            A root that is not on a free hinge (detach it first); locked hinges on the way; rotors that would act between other axes: of the
-            free hinge itself, and of a ball or free hinge on the way that has different ones about different axes; an effect of a scene
-            that acts on the coordinates of the free hinge, alone or among all, or that takes coordinates of hinges on the way one by one,
-            or all in their order. The model is as it was.
+            A root that is not on a free hinge (detach it first); locked hinges on the path; rotors that would act about other axes: of the
+            free hinge itself, and of a ball or free hinge on the path with different rotors about different axes; an effect of a scene that
+            acts on the coordinates of the free hinge, alone or among all, or that reads coordinates of hinges on the path one by one, or
+            all in their order. The model is unchanged.
 
-        Cost: the hinges on the way, and O(bodies) at the next look at the model.
+        Cost: the hinges on the path, and O(bodies) at the next use of the model.
 
         Examples
         --------
@@ -243,11 +244,11 @@ class Structure(Locking):
             self._set_accelerations({self._body(self._body_index(name))["hinge"]["name"]: first, **turned})
         return Body(self, name)
 
-    # ------------------------------------------------------------------ how
+    # ------------------------------------------------------------------ implementation
     def _fit(
         self, name: str, onto: str, called: str, given: dict[str, Any], here: bool, guess: Any, tolerance: float, velocity: str
     ) -> HingeFit:
-        """The new hinge's coordinates and velocities; where the hinge is to be "here", its placement, too."""
+        """Return the new hinge's coordinates and velocities; with placement "here", also its placement."""
         hinge, X = OneHinge(name, called, given), np.eye(4)
         X[:3, :3], X[:3, 3], V = self._relative_motion(name, onto)
         near = hinge.guess() if guess is None else _core.real_array(guess, f"q of hinge {called!r}")
@@ -271,18 +272,18 @@ class Structure(Locking):
         return fit
 
     def _caught(self, name: str, onto: str, called: str, given: dict[str, Any], fit: HingeFit) -> Impulse:
-        """The impulse of a body that its new hinge catches, found on a copy. The rotor of the new hinge is at rest before."""
+        """Return the impulse by which a body's new hinge catches it, computed on a copy. The rotor of the new hinge is at rest before."""
         from .multibody import Multibody
 
         twists = dict(zip(self._names()[0], twists_of(self).reshape(-1, 6), strict=True))
         trial = Multibody(self.name, welds="keep")
         trial._graft(self, -1, "", None, None, False, *self._branch(-1))
         trial._rehang(name, onto, hinge_name=called, q=fit.q.tolist(), v=[0.0] * len(fit.v), **given)
-        trial.take_warnings()  # said of this model already, or to be said of it
+        trial.take_warnings()  # the model itself issues them
         return impulse_into(trial, np.array([twists[other] for other in trial._names()[0]]).ravel())
 
     def _require_whole(self, way: set[str], body: str) -> None:
-        """Effects that take coordinates one by one would take other ones of hinges that are turned, and of the free one another body's."""
+        """Refuse effects that read coordinates one by one: reversed hinges change theirs, the free hinge changes its body."""
         if len(way) < 2:
             return
         sizes = {hinge: self._slices(self._hinge_index(hinge))[1] for hinge in way}
@@ -303,7 +304,7 @@ class Structure(Locking):
                 )
 
     def _set_accelerations(self, by_hinge: Mapping[str, Any]) -> None:
-        """Present accelerations of hinges that are other ones now, where any are kept."""
+        """Set present accelerations of replaced hinges, if any are stored."""
         if self._kept_frames is None:
             return
         vdot = np.array(self._kept_frames.vdot)
@@ -315,12 +316,12 @@ class Structure(Locking):
 
 
 def _beyond(error: np.ndarray, tolerance: float, sizes: np.ndarray) -> bool:
-    """Whether an angular part, or a linear part over the scale of what it is a part of, is larger than the tolerance or no number."""
+    """Check whether an angular part, or a linear part over its scale, exceeds the tolerance or is not a number."""
     return not (np.linalg.norm(error[:3]) <= tolerance and np.linalg.norm(error[3:]) <= tolerance * (1 + np.linalg.norm(sizes)))
 
 
 def _off(error: np.ndarray, angular: str, linear: str) -> str:
-    """What is missing in words: "0.3 rad about (0, 0, 1) and 0.1 m along (1, 0, 0)"."""
+    """Return the remainder in words: "0.3 rad about (0, 0, 1) and 0.1 m along (1, 0, 0)"."""
     parts = []
     for half, unit, way in ((error[:3], angular, "about"), (error[3:], linear, "along")):
         size = float(np.linalg.norm(half))

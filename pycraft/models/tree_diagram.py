@@ -1,4 +1,4 @@
-"""A model's tree as text: a line a body, with its hinge and where its coordinates are in q and v."""
+"""A model's tree as text: one line per body, with its hinge and its places in q and v."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WIDTH = 80
 _INDENT = 36
 """Columns of indentation; a deeper tree does not indent only children."""
 _LEGIBLE = 16
-"""Columns that names of hinges are given at least, where they are longer; with fewer they are left out."""
+"""Least columns for names of hinges that are longer; with fewer they are omitted."""
 
 
 class TreeDiagram:
@@ -29,7 +29,7 @@ class TreeDiagram:
 
 
 class _Line(NamedTuple):
-    """What stands before a name, and what is told of a body or node."""
+    """The text before a name, and the data of a body or node."""
 
     before: str
     name: str
@@ -55,14 +55,14 @@ def tree_diagram(model: Multibody, most: int | None = 200, nodes: bool = False) 
 
 
 def _width(lines: list[_Line]) -> int:
-    """Columns that the lines take in full."""
+    """Return the columns that the lines take in full."""
     parts = zip(*((len(line.before + line.name), len(line.kind), len(line.hinge), len(line.coordinates)) for line in lines), strict=True)
     widths = [max(part) for part in parts]
     return sum(widths) + 2 * (sum(width > 0 for width in widths) - 1)
 
 
 def _lines(model: Multibody, described: dict[str, Any], nodes: bool, step: int) -> tuple[list[_Line], bool]:
-    """A line a body, and a node where they are asked for, in the model's order; and whether only children are not indented."""
+    """Return a line per body, and per node if requested, in the model's order; and whether only children are not indented."""
     bodies = described["bodies"]
     on: dict[int, list[tuple[str, int]]] = {k: [] for k in range(-1, len(bodies))}
     for i, node in enumerate(described["nodes"] if nodes else ()):
@@ -96,19 +96,19 @@ def _lines(model: Multibody, described: dict[str, Any], nodes: bool, step: int) 
 
 
 def _with_last(items: list[tuple[str, int]]) -> list[tuple[tuple[str, int], bool | None]]:
-    """What a body carries, the last first, each with whether it is the last; None where it is the only one."""
+    """Return the children of a body, the last first, each with whether it is the last; None for an only child."""
     if len(items) == 1:
         return [(items[0], None)]
     return [(item, i == len(items) - 1) for i, item in reversed(list(enumerate(items)))]
 
 
 def _fitting(before: str, step: int) -> str:
-    """Indentation within its columns: of a deeper one, how deep it is."""
+    """Return the indentation within its columns: for a deeper one, its depth."""
     return before if len(before) <= _INDENT else f"⋯{len(before) // step}{before[-step:]}".rjust(_INDENT)
 
 
 def _columns(lines: list[_Line], most: int | None) -> list[str]:
-    """Lines in columns that fit the width, those in the middle of a long tree left out."""
+    """Return the lines in columns that fit the width, without those in the middle of a long tree."""
     dropped = 0 if most is None or len(lines) <= most else len(lines) - most
     first = len(lines) - dropped - (most or 0) // 3 if dropped else len(lines)
     shown = [*lines[:first], *lines[first + dropped :]]

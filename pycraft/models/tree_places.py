@@ -1,4 +1,4 @@
-"""Where the bodies of a tree stand in a diagram of it."""
+"""Places of the bodies of a tree in a diagram."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 
 def tree_places(parents: Sequence[int]) -> np.ndarray:
-    """(n + 1, 2) places of the bodies and, last, of the base: leaves side by side, a body above the middle of what it carries.
+    """Return (n + 1, 2) places of the bodies and, last, of the base: leaves side by side, a body above the middle of its children.
 
     Parameters
     ----------
-    parents : of each body the number of what carries it, -1 the base, each before what it carries
+    parents : number of the carrier of each body, -1 for the base, each carrier before its children
 
     Returns
     -------
     numpy.ndarray
-        x from 0 to 1 (0.5 where nothing branches), y from 0, the base, to 1, the body farthest from it by hinges. O(N).
+        x from 0 to 1 (0.5 without branches), y from 0, the base, to 1, the body farthest from it by hinges. O(N).
 
     Examples
     --------

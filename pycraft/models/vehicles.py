@@ -1,4 +1,4 @@
-"""Models that roll: trees with their wheels' rows declared (docs/loops.md), at a state on them. Lengths in m, masses in kg."""
+"""Models on wheels: trees with their wheels' rows declared (docs/loops.md), at a state on them. Lengths in m, masses in kg."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import numpy as np
 from .multibody import Multibody
 
 AXLE = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
-"""Of a wheel's disc in the wheel: z along its y."""
+"""Rotation of a wheel's disc in the wheel: z along its y."""
 
 
 def bicycle() -> Multibody:
-    """The Whipple bicycle with benchmark parameters, upright: a frame with its rider, a fork with handlebars, two wheels that do not slip.
+    """Return the Whipple bicycle with benchmark parameters, upright: a frame with its rider, a fork with handlebars, two rolling wheels.
 
-    x is forward, y to the left, z upward, and the frame's origin where the rear wheel touches the ground. Its first coordinate is the lean,
-    "steer" turns the fork about its axis, which points down: both are positive to the right, as the paper has them. Eleven rows less
-    than coordinates there are: seven displacements, three velocities.
+    x is forward, y to the left, z upward, and the frame's origin at the contact of the rear wheel. Its first coordinate is the lean,
+    "steer" turns the fork about its axis, which points down: both are positive to the right, as in the paper. Of the coordinates less the
+    rows seven displacements and three velocities remain.
 
     Source: J. P. Meijaard, J. M. Papadopoulos, A. Ruina, A. L. Schwab, Linearized dynamics equations for the balance and steer of a
-    bicycle: a benchmark and review, Proc. R. Soc. A 463, 2007, table 1, whose z is downward.
+    bicycle: a benchmark and review, Proc. R. Soc. A 463, 2007, table 1, with z downward.
     """
     wheelbase, trail, tilt = 1.02, 0.08, np.pi / 10
     model = Multibody("bicycle")

@@ -1,4 +1,4 @@
-"""What is legal but worth a word."""
+"""Warnings about legal but doubtful models."""
 
 import os
 import sys
@@ -6,11 +6,11 @@ import warnings
 
 
 class ModelWarning(UserWarning):
-    """A model's numbers are legal but doubtful: a violated triangle inequality, a massless body on a hinge."""
+    """A model is legal but doubtful: a violated triangle inequality, a massless body on a hinge."""
 
 
 def warn(text: str) -> None:
-    """Warn at the line outside the package that led here."""
+    """Warn at the calling line outside the package."""
     package = os.path.dirname(os.path.dirname(__file__)) + os.sep
     level, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(package):

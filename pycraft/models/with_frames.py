@@ -1,4 +1,4 @@
-"""A model with its frames, made when they are first asked for."""
+"""A model with its frames, created on first use."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ class WithFrames(WithOperators):
 
     @property
     def frames(self) -> Frames:
-        """All frames by name; the present time and accelerations that they take; what was computed (docs/frames.md)."""
+        """All frames by name; their present time and accelerations; counts of computations (docs/frames.md)."""
         if self._kept_frames is None:
             self._kept_frames = Frames(self)
         return self._kept_frames
 
     def frame(self, name: Any = None) -> Frame:
-        """A frame by its name: of a body, a node, a loose frame, or the base.
+        """Return a frame by its name: a body, a node, a loose frame, or the base.
 
-        The base is None, and "base" and "world" where nothing else is so called. Nothing is computed before it is asked for. ModelError
-        where no frame is called so, with the nearest name.
+        The base is None, and also "base" and "world" unless something else has the name. Nothing is computed before it is requested.
+        ModelError for an unknown name, with the nearest one.
 
         Examples
         --------
@@ -53,7 +53,7 @@ class WithFrames(WithOperators):
         placement: np.ndarray | None = None,
         motion: Motion | None = None,
     ) -> Frame:
-        """Make a loose frame on a body, a node, the base (None) or another loose frame. It changes nothing of the model and its operators.
+        """Add a loose frame on a body, a node, the base (None) or another loose frame. It does not affect the model and its operators.
 
         Parameters
         ----------
@@ -63,13 +63,14 @@ class WithFrames(WithOperators):
             Its pose on that frame, as for `add_body`.
         motion : function of time
             In place of a pose: t (s) → the pose (4, 4), or (pose, twist), or (pose, twist, acceleration); the twist (ω; v) in the frame's
-            own axes about its origin, (X⁻¹Ẋ)^∨, the acceleration its rate. Velocities need the second, accelerations the third: no
-            difference is taken in their place. It is called when a question goes over the frame, once a time, and what it gives is checked.
+            own axes about its origin, (X⁻¹Ẋ)^∨, the acceleration its rate. Velocities need the second form, accelerations the third:
+            nothing is differentiated numerically. It is called when a result depends on the frame, once per time, and its values are
+            checked.
 
         Raises
         ------
         ModelError
-            A name that is taken or unknown, a pose that is none, a motion that cannot be called.
+            A duplicate or unknown name, an invalid pose, a motion that cannot be called.
 
         Examples
         --------
@@ -82,6 +83,6 @@ class WithFrames(WithOperators):
         return self.frames.add(name, on, position=position, rotation=rotation, placement=placement, motion=motion)
 
     def _check_not_a_frame(self, name: Any, what: str) -> None:
-        """Bodies and nodes are not called as loose frames are."""
+        """Check that a body or node does not have the name of a loose frame."""
         if self._kept_frames is not None and isinstance(name, str) and self._kept_frames._core.is_loose(name):
             raise _core.ModelError(f"{self.name!r} has a frame called {name!r} already; give every {what} a name of its own")

@@ -1,4 +1,4 @@
-"""A model with its loops, made when they are first asked for."""
+"""A model with its loops, created on first use."""
 
 from __future__ import annotations
 
@@ -45,30 +45,30 @@ class WithLoops(WithFrames):
         placement: np.ndarray | None = None,
         name: str | None = None,
     ) -> Loop:
-        """Close a chain: `b` is carried by `a` on a hinge, as by `add_body` a body is by its parent. The tree and its operators stay.
+        """Close a chain: `a` carries `b` on a hinge, as in `add_body` a parent carries a body. The tree and its operators do not change.
 
         Parameters
         ----------
         b, a : names of bodies or nodes, Body, Node, or None for the base
-            Of two bodies. Which is which: a hinge's axes, point and placement are given as for a body b on its parent a.
+            Two different bodies. A hinge's axes, point and placement are given as for a body b on its parent a.
         hinge : {"weld", "pin", "slider", "screw", "universal", "gimbal", "cylindrical", "planar", "ball", "free", "custom"}
-            The motion that is permitted. A universal hinge's axes are not parallel. Gimbals whose middle axis is not across the others,
-            which do not reach every rotation, and custom hinges have six rows, of which as many as their freedoms hang on the others.
+            The permitted motion. A universal hinge's axes are not parallel. Custom hinges, and gimbals with a middle axis not perpendicular
+            to the others, which do not reach every rotation, have six rows, of which as many as their freedoms depend on the others.
         axis, axes, point, pitch, subhinges, position, rotation, placement
             As for `add_body`: the pose of b in a is placement · (the hinge's motion).
         name : str
-            By default "a to b".
+            Default: "a to b".
 
         Returns
         -------
         Loop
-            With the rows: of a pin five, named "name: about x", ..., "name: along z" in axes with z along the hinge's.
+            With its rows: for a pin five, named "name: about x", ..., "name: along z" in axes with z along the hinge's.
 
         Raises
         ------
         ModelError
-            Ends on one body (a loop of a body with itself), names that are unknown or taken, a custom hinge some of whose subhinges move
-            nothing that others do not, and what `add_body` raises of a hinge. The model stays as it was.
+            Ends on one body (a loop of a body with itself), names that are unknown or duplicate, a custom hinge with redundant subhinges,
+            and the errors of `add_body` for a hinge. The model is unchanged.
 
         Examples
         --------
@@ -91,18 +91,18 @@ class WithLoops(WithFrames):
         radius: float | None = None,
         name: str | None = None,
     ) -> Loop:
-        """A wheel or ball that rolls without slip on the plane z = 0 of a frame, or a blade that does not move sideways.
+        """Add a wheel or ball that rolls without slip on the plane z = 0 of a frame, or a blade that does not move sideways.
 
         Parameters
         ----------
         b : body or node
-            "wheel": a disc about its z, of its origin. "ball": a sphere about its origin. "blade": its z is the direction in which its
-            origin does not move against `ground`.
+            "wheel": a disc about its z, centred at its origin. "ball": a sphere about its origin. "blade": z is the direction in which its
+            origin does not move relative to `ground`.
         ground : body or node, or None for the base
         kind : {"wheel", "ball", "blade"}
-        radius : metres, of wheels and balls
+        radius : metres, for wheels and balls
 
-        Rows: of wheels and balls "contact", of positions, and two of velocities; of blades one of velocities. ModelError as for
+        Rows: for wheels and balls "contact", of positions, and two of velocities; for blades one of velocities. ModelError as in
         `add_loop`; EvaluationError from the rows of a wheel that lies flat.
 
         Examples
@@ -116,7 +116,7 @@ class WithLoops(WithFrames):
         """
         kinds = {"wheel": "wheel", "ball": "rolling ball", "blade": "blade"}
         if not isinstance(kind, str) or kind not in kinds:
-            raise _core.ModelError(f"kind={kind!r} of what rolls: there are {', '.join(map(repr, kinds))}")
+            raise _core.ModelError(f"kind={kind!r} of a rolling body: there are {', '.join(map(repr, kinds))}")
         if (radius is None) != (kind == "blade"):
             raise _core.ModelError(f"a {kind} {'has no radius' if kind == 'blade' else 'rolls on its radius: give radius= in metres'}")
         return self.loops.add_pair(b, ground, kinds[kind], 0.0 if radius is None else radius, name)
@@ -131,17 +131,17 @@ class WithLoops(WithFrames):
         c: float = 0.0,
         name: str | None = None,
     ) -> Loop:
-        """A point stays on a surface of second degree, p·A p + b·p + c = 0. One row, "across".
+        """Keep a point on a surface of second degree, p·A p + b·p + c = 0. One row, "across".
 
         Parameters
         ----------
-        point : body or node, whose origin it is
+        point : body or node, whose origin is the point
         on : body or node, or None for the base: p is the point in its frame (m)
-        A : (3, 3), symmetric or not; b : (3,); zeros by default
+        A : (3, 3), symmetric or not; b : (3,); default: zeros
         c : float
 
-        The residual is that polynomial: where its gradient is one along the surface, metres beside it. ModelError as for `add_loop`, and
-        where A and b are zero.
+        The residual is this polynomial: if its gradient has unit length along the surface, it is the distance in metres. ModelError as in
+        `add_loop`, and if A and b are zero.
 
         Examples
         --------
@@ -161,26 +161,32 @@ class WithLoops(WithFrames):
         curve: Any,
         parameters: Any = None,
         closed: bool = False,
+        ends: str = "not-a-knot",
         name: str | None = None,
     ) -> Loop:
-        """A point stays on a curve: a bead on a wire, a pin in a bent slot. Two rows, "across 1" and "across 2".
+        """Keep a point on a curve: a bead on a wire, a pin in a bent slot. Two rows, "across 1" and "across 2".
 
         Parameters
         ----------
-        point : body or node, whose origin it is
+        point : body or node, whose origin is the point
         on : body or node, or None for the base: the curve is given in its frame (m)
-        curve : (n, 3), a piecewise polynomial of SciPy's, or a function
-            Points, with the cubic spline through them, natural or, closed, periodic; a CubicSpline or PPoly of points (3,); a function
-            of one number that returns a point (3,), which is fitted once, to its rounding, by polynomials. It has no corners.
+        curve : (n, 3), a SciPy piecewise polynomial, or a function
+            Points, with the cubic spline through them, with these `ends` or, if closed, periodic; a CubicSpline or PPoly of points (3,); a
+            function of one number that returns a point (3,), which is fitted once, to its rounding, by polynomials. It must not have
+            corners.
         parameters : (n,), ascending
-            Of points: lengths from one to the next by default. Of a function, which needs them: (first, last), and what is between.
+            For points: default: lengths from one to the next. For a function, required: (first, last), the interval.
         closed : bool
-            The curve ends where it begins, of points with the first one again as the last. An open one goes on straight beyond its ends.
+            The curve ends where it begins; points then repeat the first one as the last. An open curve continues straight beyond its ends.
+        ends : {"not-a-knot", "natural"}; for an open curve through points
+            "not-a-knot": one cubic through the first two intervals, and one through the last two, as in `pycraft.Spline` and SciPy: for
+            points of a smooth curve at distance h the error is O(h⁴) everywhere. "natural": without second derivatives at the ends, so
+            that curvature does not jump where the curve continues straight; with an error of O(h²) near them.
 
         Rows: with c the nearest place of the curve and n₁, n₂ normals there, n_i·(p - c): |r| is the distance (m). n₂ is the normal of a
-        plane curve's plane, and of others turns about the curve as little as may be. Where a curve crosses itself a point goes on along
-        the branch that it is nearest to. ModelError as for `add_loop`, and by name and parameter for curves that jump, stand still or have
-        corners, and functions that are not smooth. Cost: a distance a piece, and a search on those that may be nearest.
+        plane curve's plane, and for others it turns about the curve as little as possible. Where a curve crosses itself a point continues
+        along the nearest branch. ModelError as in `add_loop`, and by name and parameter for curves that jump, stand still or have corners,
+        and functions that are not smooth. Cost: a distance per piece, and a search on pieces that may be nearest.
 
         Examples
         --------
@@ -192,7 +198,7 @@ class WithLoops(WithFrames):
         >>> float(mb.loops["helix"].residual([1, 0, 0, 0, 1.5, 0.0, 0.0]).round(3) @ [1, 0])  # half a metre off, away from the axis
         -0.5
         """
-        return self.loops.add_curve(point, on, curve, parameters, closed, name)
+        return self.loops.add_curve(point, on, curve, parameters, closed, name, ends)
 
     def add_coupling(
         self,
@@ -202,19 +208,19 @@ class WithLoops(WithFrames):
         function: Relation | None = None,
         name: str | None = None,
     ) -> Loop:
-        """A relation between coordinates: constant + Σ polynomial(q_i) = 0, or any smooth one. One row.
+        """Add a relation between coordinates: constant + Σ polynomial(q_i) = 0, or any smooth one. One row.
 
         Parameters
         ----------
         coordinates : {coordinate: coefficients}, or a list of coordinates beside a function
-            Coordinates by name, number, or hinge of one. Coefficients: a number, of q; or those of 1, q, q², ....
+            Coordinates by name, number, or hinge of one. Coefficients: a number, for q; or a list for 1, q, q², ....
         constant : float
         function : function of the coordinates (n,)
-            Returns (r, gradient (n,), second derivatives (n, n)), and if it has them third ones (n, n, n), which second derivatives of
-            rows and linear models in motion take; rows are then there in double precision. It is called at every state.
-            `pycraft.Spline` is one through points.
+            Returns (r, gradient (n,), second derivatives (n, n)), and optionally third ones (n, n, n), which second derivatives of rows and
+            linear models in motion need; rows are then in double precision. It is called at every state. `pycraft.Spline` is one through
+            points.
         name : str
-            By default "coupling".
+            Default: "coupling".
 
         A gear, a mimic: {"a": 1, "b": -ratio}; a rack on a pinion of radius ρ: {"rack": 1, "pinion": -ρ}; a differential:
         {"left": 1, "right": 1, "cage": -2}; a cable over pulleys: {"a": ρ_a, "b": ρ_b}.
@@ -222,8 +228,8 @@ class WithLoops(WithFrames):
         Raises
         ------
         ModelError
-            Coordinates that are unknown, named twice, or no single number in q (of ball and free hinges); coefficients that are all zero; a
-            function that cannot be called, or does not return the three, second derivatives symmetric to differences of 1e-4.
+            Coordinates that are unknown, named twice, or not single values in q (of ball and free hinges); coefficients that are all zero;
+            a function that cannot be called, or does not return the three, second derivatives symmetric to differences of 1e-4.
 
         Examples
         --------
@@ -247,33 +253,34 @@ class WithLoops(WithFrames):
         seed: int | np.random.Generator = 0,
         tolerance: float = 1e-10,
     ) -> State:
-        """A state on all loops, near q0 where there is one, and velocities that keep them. The model's own state is not set.
+        """Return a state on all loops, near q0 if possible, and velocities that keep them. The model's own state is not set.
 
         Parameters
         ----------
-        q0, v0 : (nq,), (nv,), or a State; the model's present state where they are left out
-            From which others are tried, further and further off. Of a batch (B, nq), (B, nv) each state by itself, one after the other.
+        q0, v0 : (nq,), (nv,), or a State; default: the model's present state
+            The first start; further starts are at growing distances. In a batch (B, nq), (B, nv) each state is treated separately.
         fix : names or numbers of coordinates, or hinges, or a list of them
-            Those keep what they are in q0 and v0, to the last bit. Of a ball or free hinge all coordinates, or none.
+            They keep their values in q0 and v0, to the last bit. For a ball or free hinge all coordinates, or none.
         starts : int
-            How many are tried, q0 the first.
+            Number of starts, q0 the first.
         seed : int or numpy.random.Generator
         tolerance : float
-            The largest residual that counts as closed, of each row by its size (`loops.sizes`); what is found is then refined to rounding.
+            The largest residual that counts as closed, relative to the size of each row (`loops.sizes`); the result is then refined to
+            rounding.
 
         Returns
         -------
         State
-            From each start by damped least squares on the model's group, with exact Jacobians; v is the nearest to v0 with Q v = 0, rows of
-            velocities included. Of a batch (B, nq) and (B, nv).
+            From each start by damped least squares on the model's group, with exact Jacobians; v is the nearest to v0 with Q v = 0,
+            including rows of velocities. For a batch (B, nq) and (B, nv).
 
         Raises
         ------
         ModelError
-            None was found: which loops cannot be closed by themselves, or which not together, and the rows that are left, by how much.
-            Velocities that are kept and break rows, which are named. Of a batch, at which state.
+            No state was found: names the loops that cannot be closed alone, or not together, and the rows with their residuals. Fixed
+            velocities that violate rows, by name. In a batch, the state.
 
-        Cost: some ten evaluations of the rows and dense least squares, O(rows² nv) each, a start.
+        Cost: some ten evaluations of the rows and dense least squares, O(rows² nv) each, per start.
 
         Examples
         --------
@@ -296,10 +303,10 @@ class WithLoops(WithFrames):
         seed: int | np.random.Generator = 0,
         tolerance: float = 1e-10,
     ) -> list[State]:
-        """The different states on all loops that are found from many starts, the nearest to q0 first; as many as there are, or fewer.
+        """Return the different states on all loops found from many starts, the nearest to q0 first; all of them, or fewer.
 
-        Arguments as of `assemble`; angles of pins that no coupling winds are told apart up to whole turns. ModelError as there, and where
-        the loops leave degrees of freedom: fix as many coordinates.
+        Arguments as in `assemble`; angles of pins in no coupling are equal up to whole turns. ModelError as there, and if the loops leave
+        degrees of freedom: fix as many coordinates.
 
         Examples
         --------
@@ -312,15 +319,16 @@ class WithLoops(WithFrames):
         return branches(self, q0, v0, fix, starts, seed, tolerance)
 
     def mobility(self, q: Any = None, *, tolerance: float = 1e-8) -> Mobility:
-        """What the loops leave free at a state on them: degrees of freedom, redundant rows by name, how far it is to a singular one.
+        """Return the freedoms left by the loops at a state on them: degrees of freedom, redundant rows by name, distance to a singular
+        state.
 
         Parameters
         ----------
-        q : (nq,), or a State; the model's present state where it is left out
+        q : (nq,), or a State; default: the model's present state
         tolerance : float
-            Singular values of Q, by the length of its longest row, count as zero below it.
+            Singular values of Q, relative to the length of its longest row, count as zero below it.
 
-        Raises ModelError where q is not on the loops, with the row that is most off. Cost: a pivoted factor and singular values of Q,
+        Raises ModelError for a q that is not on the loops, with the worst row. Cost: a pivoted factorization and singular values of Q,
         O(rows² nv), and singular values at four neighbouring states.
 
         Examples
@@ -337,30 +345,30 @@ class WithLoops(WithFrames):
         return mobility(self, q, tolerance)
 
     def mobility_along(self, q: Any, *, tolerance: float = 1e-6) -> MobilityAlong:
-        """Rank and degrees of freedom at the samples of a motion, and the singular states on it, found between samples too.
+        """Return rank and degrees of freedom at the samples of a motion, and the singular states on it, including those between samples.
 
         Parameters
         ----------
-        q : (B, nq), or a State or Trajectory of so many
-            States on the loops, in order of the motion: those of `assemble`. Between two of them the way is the straight one on the group,
-            by the shorter turn, brought back onto the loops.
+        q : (B, nq), or a State or Trajectory of that many states
+            States on the loops, in order of the motion, such as those of `assemble`. Between two of them the path is the straight one on
+            the group, by the shorter turn, projected onto the loops.
         tolerance : float
-            Singular values of Q, by the length of its longest row, count as zero below it. At a singular state of the loops q is no better
-            than the root of its residuals' rounding, 1e-8, and so is what is zero there.
+            Singular values of Q, relative to the length of its longest row, count as zero below it. At a singular state of the loops q is
+            only as accurate as the root of its residuals' rounding, 1e-8, and so are values that should be zero there.
 
         Returns
         -------
         MobilityAlong
             Rank, degrees of freedom, singular values and distance at each sample; `singular_states`, each with its place, its state and the
-            rows that are lost there. A singular state is found where the distance has its least value between neighbouring samples:
-            two within one sample's width may be taken for one.
+            lost rows. A singular state is found where the distance has a minimum between neighbouring samples: two within one sample's
+            width may be merged into one.
 
         Raises
         ------
         ModelError
-            A sample that is not on the loops, with its number and the row that is most off; no state on them was found between two samples.
+            A sample that is not on the loops, with its number and the worst row; no state on them was found between two samples.
 
-        Cost: singular values of Q at every sample, O(rows² nv); some sixty states on the loops for each place where the distance is least.
+        Cost: singular values of Q at every sample, O(rows² nv); some sixty states on the loops for each minimum of the distance.
 
         Examples
         --------

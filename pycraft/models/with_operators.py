@@ -1,4 +1,4 @@
-"""A model with its spatial operators, made when they are first asked for and again when its structure has changed."""
+"""A model with its spatial operators, created on first use and again after a change of structure."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from . import warning
 
 
 class WithOperators(_core.Multibody):
-    """The core's model with its operators, and what is worth a word before they are used."""
+    """The core's model with its operators, and warnings before they are used."""
 
     _soa: OperatorSet | None = None
 
@@ -21,10 +21,10 @@ class WithOperators(_core.Multibody):
         return self._soa
 
     def _say(self, text: str) -> None:
-        """Warn, at the line outside the package."""
+        """Issue a warning at the line outside the package."""
         warning.warn(text)
 
     def warn(self) -> None:
-        """Say, once, what is legal but worth a word: violated triangle inequalities, massless bodies on hinges."""
+        """Warn, once, of legal but doubtful data: violated triangle inequalities, massless bodies on hinges."""
         for _, words in self.take_warnings():
             warning.warn(words)

@@ -1,4 +1,4 @@
-"""The operators of a model by their letters, and how their blocks are shown."""
+"""The operators of a model by their letters, and views of their blocks."""
 
 from .operator_set import OperatorSet
 

@@ -1,4 +1,4 @@
-"""Pictures of many blocks: each cell several of them, blue where the largest entry is positive, orange where it is negative."""
+"""Pictures of many blocks: each cell stands for several, blue if the largest entry is positive, orange if it is negative."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from html import escape
 import numpy as np
 
 CELLS = 48
-"""Cells a row or column of the picture."""
+"""Cells per row or column of the picture."""
 _CELL, _FONT = 11.0, 10.0
 _LETTERS = 18  # of a label
 _DECADES = 8.0
 
 
 def colour(x: float, scale: float, deepest: float = 0.45) -> str:
-    """Blue or orange over whatever lies behind, deeper where |x| is larger: up to 0.45 the page's own ink is legible on it."""
+    """Return blue or orange over any background, deeper for larger |x|: up to 0.45 text in the page's own colour is legible on it."""
     depth = deepest * min(1.0, max(0.15, 1 + np.log10(abs(x) / scale) / _DECADES))
     return f"rgba({'60,130,220' if x > 0 else '230,120,30'},{depth:.2f})"
 
 
 def block_picture(numbers: np.ndarray, rows: list[str], columns: list[str]) -> str:
-    """An SVG of `numbers` (rows, columns), one a block, as at most 48 × 48 cells; pointing at one tells its blocks and largest entry."""
+    """Return an SVG of `numbers` (rows, columns), one per block, as at most 48 × 48 cells; hovering shows a cell's blocks and largest
+    entry."""
     (tops, lefts), cells = _gathered(numbers)
     scale = np.abs(cells).max(initial=0.0)
     edge = _FONT * 0.62 * min(max((len(name) for name in rows), default=0), _LETTERS) + 8
@@ -47,7 +48,7 @@ def block_picture(numbers: np.ndarray, rows: list[str], columns: list[str]) -> s
 
 
 def _gathered(numbers: np.ndarray) -> tuple[tuple[list[int], list[int]], np.ndarray]:
-    """The first block of each cell's rows and columns, and of each cell the number of largest magnitude."""
+    """Return the first block of each cell's rows and columns, and for each cell the number of largest magnitude."""
     begins = tuple(list(range(0, n, max(1, -(-n // CELLS)))) for n in numbers.shape)
     most = np.maximum.reduceat(np.maximum.reduceat(numbers, begins[0], axis=0), begins[1], axis=1)
     least = np.minimum.reduceat(np.minimum.reduceat(numbers, begins[0], axis=0), begins[1], axis=1)

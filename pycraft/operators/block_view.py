@@ -1,4 +1,4 @@
-"""Operators as labelled blocks: rows and columns by body, hinge or node name, for indexing and for looking at."""
+"""Operators as labelled blocks: rows and columns by body, hinge or node name, for indexing and display."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .. import _core
 from .block_picture import block_picture, colour
 
 ENTRIES = 12
-"""Up to so many rows and columns every entry is shown; beyond, one number a block."""
+"""Up to this many rows and columns every entry is shown; beyond, one number per block."""
 BLOCKS = 40
-"""Blocks a row or column of the HTML table, beyond which it is a picture; the text shows as many columns as fit."""
+"""Largest number of blocks per row or column of the HTML table; larger ones are a picture; the text shows as many columns as fit."""
 _COLUMNS = 256
-"""That an operator is applied to at a time where its blocks are looked at and not kept."""
+"""Columns to which an operator is applied at a time if its blocks are displayed but not stored."""
 _KEPT = 4_000_000
-"""Numbers of a dense form up to which it is formed to look at its blocks."""
+"""Largest number of entries of a dense form that is formed to display its blocks."""
 WIDTH = 80
 LEGEND = "largest entry of each block, with its sign"
 
@@ -28,12 +28,12 @@ class BlockView:
     """A dense operator cut into labelled blocks: rows and columns by body, hinge or node name.
 
     `view["link2", "link3"]` is the block in that row and column; `view.rows`, `view.columns` are the labels. With
-    `order="tip-to-base"` the last body comes first, so that φ is lower triangular as in the book. Up to 12 rows and columns every entry
-    is shown, lines part the blocks; beyond, each block shows its largest entry with its sign. In a notebook blue cells are positive, orange
-    ones negative, deeper where the logarithm of their size is larger; beyond 40 blocks it is a picture of all of them, several to a cell.
+    `order="tip-to-base"` the last body comes first, so that φ is lower triangular as in the book. Up to 12 rows and columns every entry is
+    shown, lines separate the blocks; beyond, each block shows its largest entry with its sign. In a notebook blue cells are positive,
+    orange ones negative, deeper for a larger logarithm of their size; beyond 40 blocks it is a picture of all of them, several per cell.
 
-    `view.values` are the numbers, dense, formed when they are asked for; what is shown of large operators needs them not, and is found from
-    256 columns at a time: of n blocks that takes O(n²), in memory n² numbers.
+    `view.values` are the dense values, formed on first use; the display of large operators does not need them, and uses 256 columns at a
+    time: for n blocks it takes O(n²) time and n² numbers of memory.
     """
 
     def __init__(self, operator: _core.Operator, rows: list[tuple[str, slice]], columns: list[tuple[str, slice]], title: str):
@@ -91,20 +91,21 @@ class BlockView:
         return np.abs(self.largest())
 
     def on_robot(self, on: str = "robot") -> Any:
-        """The blocks beside the model as it stands, or its tree: pointing at a block lights the path between its bodies.
+        """Return the blocks beside the model at its state, or its tree: hovering over a block highlights the path between its bodies.
 
-        A `LinkedBlocks`, which shows itself in a notebook and is saved as a page; see there for what it takes.
+        A `LinkedBlocks`, which a notebook displays and which can be saved as a page; see there for the options.
         """
         return _core._face["linked_blocks"](self, on)
 
-    # ------------------------------------------------------------------ what is shown
+    # ------------------------------------------------------------------ display
     @property
     def _shape(self) -> tuple[int, int]:
         height, width = (max((where.stop for where in blocks.values()), default=0) for blocks in (self._rows, self._columns))
         return height, width
 
     def _cells(self) -> tuple[np.ndarray, list[str], list[str], list[bool], list[bool]]:
-        """Numbers, labels of rows and columns, and where a block begins in each: entries of small operators, else one number a block."""
+        """Return numbers, labels of rows and columns, and the first of each block: entries of small operators, else one number per
+        block."""
         if max(self._shape) > ENTRIES:
             return self._largest, self.rows, self.columns, [False] * len(self.rows), [False] * len(self.columns)
         (of_row, rows, top), (of_column, columns, left) = (_entries(blocks) for blocks in (self._rows, self._columns))
@@ -149,7 +150,7 @@ class BlockView:
 
 
 def _signed(numbers: np.ndarray, parts: list[slice], axis: int) -> np.ndarray:
-    """Of each part of an axis the entry of largest magnitude, with its sign; 0 of an empty part."""
+    """Return, for each part of an axis, the entry of largest magnitude, with its sign; 0 for an empty part."""
     shape = [*numbers.shape]
     shape[axis] = len(parts)
     out = np.zeros(shape)
@@ -167,7 +168,7 @@ def _signed(numbers: np.ndarray, parts: list[slice], axis: int) -> np.ndarray:
 
 
 def _entries(blocks: dict[str, slice]) -> tuple[list[int], list[str], list[bool]]:
-    """The entries of labelled blocks in their order: number, label (with the number in its block), whether a block begins there."""
+    """Return the entries of labelled blocks in their order: number, label (with the number in its block), whether a block begins there."""
     index: list[int] = []
     labels: list[str] = []
     begins: list[bool] = []
@@ -180,7 +181,8 @@ def _entries(blocks: dict[str, slice]) -> tuple[list[int], list[str], list[bool]
 
 
 def _cell(x: float, scale: float, top: bool, left: bool) -> str:
-    """A cell: blue or orange over whatever lies behind, in the page's own ink, so that it reads on white and on black."""
+    """Return a cell: blue or orange over any background, with text in the page's own colour, so that it is legible on white and on
+    black."""
     lines = "".join(f"border-{side}:1px solid;" for side, there in (("top", top), ("left", left)) if there)
     if x == 0:
         return f"<td style='{lines}text-align:center;padding:2px 6px'></td>"
@@ -188,12 +190,12 @@ def _cell(x: float, scale: float, top: bool, left: bool) -> str:
 
 
 def block_view(operator: _core.Operator, order: str = "base-to-tip") -> BlockView:
-    """The operator's dense form as labelled blocks.
+    """Return the operator's dense form as labelled blocks.
 
     Raises
     ------
     EvaluationError
-        An order that is neither "base-to-tip" nor "tip-to-base"; a batch of states is bound.
+        An unknown order; a bound batch of states.
     """
     if order not in ("base-to-tip", "tip-to-base"):
         raise _core.EvaluationError(f"order={order!r}: there are 'base-to-tip' and 'tip-to-base'")

@@ -6,7 +6,7 @@ from .. import _core
 
 
 class Explanation(str):
-    """A plan as text: prints as a table; in a notebook it is one, with the sweeps drawn on the tree."""
+    """A plan as text: prints as a table; in a notebook it is a table with the sweeps drawn on the tree."""
 
     expression: _core.Operator
     request: str
@@ -19,7 +19,7 @@ class Explanation(str):
 
 
 def explain(operator: _core.Operator, request: str = "apply") -> Explanation:
-    """The plan of an expression as a table of steps, tiers and costs; after a run, with what the run reported."""
+    """Return the plan of an expression as a table of steps, tiers and costs; after a run, with the run's report."""
     made = Explanation(str(operator.plan(request)))
     made.expression, made.request = operator, request
     return made

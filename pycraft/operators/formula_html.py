@@ -1,4 +1,4 @@
-"""Formulas in HTML without a script: exponents and indices are raised and lowered, everything else stays as it is typed."""
+"""Formulas in HTML without a script: exponents and indices are raised and lowered, the rest is unchanged."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from html import escape
 _STAR = re.compile("(?<=[^\\W\\d]|[)\\]}⁻⁺¹½]|[\u0300-\u036f])\\*")
 _EXPONENT = re.compile(r"\^(-?½|-?\d+|[^\W\d_])")
 _INDEX = re.compile(r"_(ff|fp|pf|pp|[^\W\d_]|\d+)(?![A-Za-z]{2})")
-"""Of one letter, or of the parts of a partition; not the tail of a word such as phi_tilde."""
+"""For one letter, or for the parts of a partition; not the tail of a word such as phi_tilde."""
 STYLE = "font-family:'STIX Two Math','Cambria Math','DejaVu Serif',serif;font-size:1.08em;overflow-wrap:anywhere"
 
 
 def formula_html(text: str) -> str:
-    """A formula in Unicode letters as HTML, a span that wraps where its line ends.
+    """Return a formula in Unicode letters as HTML, a span that wraps at the end of its line.
 
-    Notebooks that are not trusted, editors that run no MathJax and static pages show it alike.
+    Untrusted notebooks, editors without MathJax and static pages all show it the same way.
 
     Examples
     --------

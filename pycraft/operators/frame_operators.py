@@ -1,7 +1,7 @@
 """Jacobians of one frame relative to another as expressions of the letters 𝒥, B, X = φ(0,k), φ, H and of constants.
 
-A frame is given by the body k that it is fixed on, None for the base, and its pose there. With W(k) = B(k)* X⁻* φ*H*, the motion of body
-k in the world's axes about the world's origin, and T(k) = B(k)* X* 1(k), which brings such a motion to the body's own (6 × 6), the Jacobian
+A frame is given by the body k that carries it, None for the base, and its pose there. With W(k) = B(k)* X⁻* φ*H*, the motion of body k in
+the world's axes about the world's origin, and T(k) = B(k)* X* 1(k), which transforms such a motion to the body's own (6 × 6), the Jacobian
 of a frame a relative to a frame b is, L_a = Ad(X_ka⁻¹) a constant,
 
     body     L_a (𝒥(k_a) - T(k_a) W(k_b))
@@ -9,7 +9,7 @@ of a frame a relative to a frame b is, L_a = Ad(X_ka⁻¹) a constant,
     aligned  R_b* ρ(k_b) ρ(k_a)* R_a of the first one, ρ(k) the blocks of T(k) on its diagonal: the rotation alone; and so in the axes of a
              third frame
 
-What is fixed on the base has neither W nor T. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (node Jacobians; φ between any
+Frames on the base have neither W nor T. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (node Jacobians; φ between any
 frames).
 """
 
@@ -23,11 +23,11 @@ import numpy as np
 from .. import _core
 
 Anchor = tuple[str | None, np.ndarray]
-"""The body that a frame is fixed on, None for the base, and its pose (4, 4) there."""
+"""The body that carries a frame, None for the base, and its pose (4, 4) there."""
 
 
 def relative_jacobian(model: Any, anchors: dict[str, Anchor | None], axes: str, coordinates: Sequence[int] | None) -> _core.Operator:
-    """The Jacobian of the anchor "frame" relative to "wrt", in the axes "body", "aligned", "world", or "other", which are those of "axes".
+    """Return the Jacobian of the anchor "frame" relative to "wrt", in the axes "body", "aligned", "world", or "other", given by "axes".
 
     Θ → R⁶, or R^m → R⁶ from m coordinates. O(N).
     """
@@ -74,7 +74,7 @@ class _Letters:
         return L @ self.from_world(b[0]) @ moved
 
     def turned(self, a: Anchor, c: Anchor) -> _core.Operator:
-        """diag(R, R), R the axes of a in those of c."""
+        """Return diag(R, R), R the axes of a in those of c."""
         turn = _rotation(a[1][:3, :3])
         if a[0] != c[0]:
             if a[0] is not None:
@@ -87,17 +87,17 @@ class _Letters:
         return _core.constant(np.zeros((6, self.model.nv)), self.soa.Theta, 6, "0")
 
     def six(self, body: str) -> _core.Operator:
-        """The motion of a body as six numbers: NodesV → R⁶."""
+        """Return the motion of a body as a 6-vector: NodesV → R⁶."""
         return _core.constant(np.eye(6), self.soa.NodesV([body]), 6, "1")
 
     def world(self, body: str | None) -> _core.Operator:
-        """W(k): Θ → R⁶."""
+        """Return W(k): Θ → R⁶."""
         assert body is not None
         B, X, phi, H = self.soa.B([body]), self.soa.X_world, self.soa.phi, self.soa.H
         return self.six(body) @ B.T @ X.inv().T @ phi.T @ H.T
 
     def from_world(self, body: str) -> _core.Operator:
-        """T(k): R⁶ → R⁶."""
+        """Return T(k): R⁶ → R⁶."""
         space = self.soa.NodesV([body])
         blocks = [np.eye(6) if name == body else np.zeros((6, 0)) for name in self.model.bodies]
         at = _core.constant(blocks, space, self.soa.V, "1")
@@ -105,19 +105,19 @@ class _Letters:
         return self.six(body) @ self.soa.B([body]).T @ self.soa.X_world.T @ at @ given
 
     def axes_from_world(self, body: str) -> _core.Operator:
-        """ρ(k): diag(R*, R*) of T(k)."""
+        """Return ρ(k): diag(R*, R*) of T(k)."""
         T = self.from_world(body)
         angular, linear = (_core.constant(np.repeat(which, 3), 6, 6, "1") for which in ((1.0, 0.0), (0.0, 1.0)))
         return angular @ T @ angular + linear @ T @ linear
 
 
 def _adjoint(X: np.ndarray) -> _core.Operator:
-    """Ad(X), motions in the axes before X from those after it."""
+    """Return Ad(X), motions in the axes before X from those after it."""
     R, p = X[:3, :3], X[:3, 3]
     cross = np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]])
     return _core.constant(np.block([[R, np.zeros((3, 3))], [cross @ R, R]]), 6, 6, "Ad")
 
 
 def _rotation(R: np.ndarray) -> _core.Operator:
-    """diag(R, R)."""
+    """Return diag(R, R)."""
     return _core.constant(np.kron(np.eye(2), R), 6, 6, "R")

@@ -1,4 +1,4 @@
-"""The operators of free coordinates where others are prescribed (hybrid dynamics)."""
+"""The operators of free coordinates with others prescribed (hybrid dynamics)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .operator_set import OperatorSet, some_of
 
 
 class FreeOperators(OperatorSet):
-    """The operators of free coordinates, and what the motion of the prescribed ones comes to while those follow."""
+    """The operators of free coordinates, and the motion due to the prescribed ones with the free ones following."""
 
     def __init__(self, whole: OperatorSet, held: Sequence[bool]):
         super().__init__(_core._some_coordinates(whole._source, [not one for one in held]), whole._model)
@@ -30,9 +30,9 @@ class FreeOperators(OperatorSet):
 
     @property
     def Schur_complement(self) -> _core.Operator:
-        """``ℳ_pp + J_p - ℳ_pf (ℳ_ff + J_f)⁻¹ ℳ_fp``, Θ_p → Θ_p: what inertia is felt at prescribed coordinates, the free ones following.
+        """``ℳ_pp + J_p - ℳ_pf (ℳ_ff + J_f)⁻¹ ℳ_fp``, Θ_p → Θ_p: the inertia felt at prescribed coordinates, the free ones following.
 
-        ``H_p Y*MY H_p*`` where hinges have no rotor inertia.
+        ``H_p Y*MY H_p*`` if hinges have no rotor inertia.
         """
         H_p, H_f, whole = self.of_prescribed.H, self.H, self._whole
         inertia = whole.phi @ whole.M @ whole.phi.T
@@ -40,8 +40,8 @@ class FreeOperators(OperatorSet):
         return H_p @ inertia @ H_p.T + self.of_prescribed.J - coupled.T @ (H_f @ inertia @ H_f.T + self.J).inv() @ coupled
 
     def generalized_Jacobian(self, names: str | Sequence[str]) -> _core.Operator:
-        """``B* Y H_p*``, Θ_p → NodesV: motions of these nodes by velocities of the prescribed coordinates, the free ones following.
+        """Return ``B* Y H_p*``, Θ_p → NodesV: motions of these nodes by velocities of the prescribed coordinates, the free ones following.
 
-        For a free-flying base that is all that is not prescribed, the generalized Jacobian of space robots: momentum stays zero.
+        If only a free-flying base is not prescribed, this is the generalized Jacobian of space robots: momentum stays zero.
         """
         return self._whole.B(names).T @ self.Y @ self.of_prescribed.H.T

@@ -1,6 +1,6 @@
-"""Long formulas in LaTeX, broken where a book breaks them: at relations, then at sums, then between factors, then inside brackets.
+"""Break long formulas in LaTeX as books do: at relations, then at sums, then between factors, then inside brackets.
 
-What comes out has no environment but `aligned`, whose lines hold whole pairs of \\left and \\right: MathJax and KaTeX both set it.
+The result has no environment except `aligned`, with lines that contain whole pairs of \\left and \\right: MathJax and KaTeX both accept it.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 
 WIDTH = 64
-"""Letters of a line: some 40 em, what a notebook's cell and a page of text have beside their margins."""
+"""Letters per line: some 40 em, the width of a notebook's cell and of a page of text."""
 DEEPEST = 60
-"""Brackets within brackets beyond which it stays as it is."""
+"""Depth of brackets beyond which a formula is left unchanged."""
 LONGEST = 20_000
-"""Characters of a formula beyond which it stays as it is."""
+"""Number of characters beyond which a formula is left unchanged."""
 _TOKEN = re.compile(r"\\(?:left|right)(?![A-Za-z])\s*(?:\\[A-Za-z]+|\\.|.)|\\[A-Za-z]+\s*|\\.|\s+|.", re.S)
 _OPENS, _CLOSES = re.compile(r"[(\[]|\\\{|\\left(?![A-Za-z])."), re.compile(r"[)\]]|\\\}|\\right(?![A-Za-z]).")
 _RELATIONS = {"=", "<", ">", "\\le", "\\ge", "\\leq", "\\geq", "\\ne", "\\to", "\\approx", "\\equiv"}
@@ -39,13 +39,13 @@ _NO_WIDTH = {
 }
 _ACCENTS = {"\\tilde", "\\bar", "\\dot", "\\ddot", "\\hat", "\\operatorname", "\\frac", "\\small", "\\quad", "\\qquad"}
 _PREFIXES = {*_ACCENTS, "\\text", "\\mathrm", "\\mathcal", "\\mathfrak", "\\mathbf", "\\ln", "\\det", "\\partial"}
-"""What stays with the piece after it."""
+"""Commands that stay with the piece after them."""
 _WORDS = {"\\ln": 2, "\\det": 3, "\\operatorname": 0, "\\left": 0, "\\right": 0, "\\quad": 2, "\\qquad": 4}
 
 
 @dataclass
 class _Piece:
-    """A factor, a sign between two, a relation, a comma, or a prefix, with what stays with it; of a bracket also what is inside."""
+    """A factor, a sign between two, a relation, a comma, or a prefix, with everything attached to it; for a bracket also its contents."""
 
     kind: str
     text: str
@@ -59,11 +59,11 @@ class _Piece:
 
 
 def in_lines(latex: str, width: int = WIDTH) -> str:
-    """A formula whose lines have some `width` letters at most: itself where it is as short, else an aligned environment.
+    """Return a formula with lines of at most some `width` letters: unchanged if it is short enough, else an aligned environment.
 
-    Without line ends and marks of alignment it is the same formula, piece by piece. What has an environment of its own, or more than
-    20 000 characters or 60 brackets within each other, is left alone. Time and memory in proportion to the formula's length, times how
-    deep its brackets go.
+    Without line ends and alignment marks it is the same formula, piece by piece. Formulas with an environment of their own, or with more
+    than 20 000 characters or 60 nested brackets, are left unchanged. Time and memory are proportional to the formula's length times the
+    depth of its brackets.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def in_lines(latex: str, width: int = WIDTH) -> str:
 
 
 def lines_of(latex: str, width: int = WIDTH) -> list[str]:
-    """The lines of `in_lines`, for an environment of one's own."""
+    """Return the lines of `in_lines`, for the caller's own environment."""
     if len(latex) > LONGEST or "\\begin" in latex or formula_width(latex) <= width:
         return [latex]
     tokens = _TOKEN.findall(latex)
@@ -91,7 +91,7 @@ def lines_of(latex: str, width: int = WIDTH) -> list[str]:
 
 
 def formula_width(latex: str) -> float:
-    """Letters that a formula is wide, estimated: a letter one, an exponent or an index two thirds."""
+    """Return the estimated width of a formula in letters: a letter one, an exponent or an index two thirds."""
     total, scale, raised, next_raised = 0.0, [1.0], 1.0, False
     for token in map(str.strip, _TOKEN.findall(latex)):
         if not token:
@@ -114,9 +114,9 @@ def formula_width(latex: str) -> float:
 
 # ---------------------------------------------------------------------- reading
 def _pieces(tokens: Iterator[str]) -> tuple[list[_Piece], str]:
-    """The pieces up to the bracket that closes them, and that bracket."""
+    """Return the pieces up to the bracket that closes them, and that bracket."""
     made: list[_Piece] = []
-    script = False  # what comes next belongs to what came before: an exponent, an index
+    script = False  # the next token belongs to the previous piece: an exponent, an index
     for token in tokens:
         bare = token.strip()
         if not bare:
@@ -147,7 +147,7 @@ def _pieces(tokens: Iterator[str]) -> tuple[list[_Piece], str]:
 
 
 def _add(made: list[_Piece], text: str) -> None:
-    """What stays with the piece before it."""
+    """Attach a text to the piece before it."""
     if not made:
         made.append(_Piece("factor", ""))
     made[-1].text += text
@@ -156,7 +156,7 @@ def _add(made: list[_Piece], text: str) -> None:
 
 
 def _group(tokens: Iterator[str]) -> str:
-    """The text of a group in braces, with its end."""
+    """Return the text of a group in braces, with its end."""
     text, depth = "", 1
     for token in tokens:
         text += token
@@ -173,7 +173,7 @@ def _bracket(opening: str, tokens: Iterator[str]) -> _Piece:
 
 
 def _braced(tokens: Iterator[str]) -> _Piece:
-    """A group in braces; where it is one bracket, what is inside may be broken."""
+    """Return a group in braces; if it is one bracket, its contents may be broken."""
     whole = _group(tokens)
     inner = _pieces(iter(_TOKEN.findall(whole[:-1])))[0] if whole.endswith("}") else []
     if len(inner) == 1 and inner[0].inside:
@@ -184,12 +184,12 @@ def _braced(tokens: Iterator[str]) -> _Piece:
 
 # ---------------------------------------------------------------------- breaking
 def aligned(rows: list[str]) -> str:
-    """Lines as one environment, flush left."""
+    """Return the lines as one environment, flush left."""
     return "\\begin{aligned}& " + "\\\\\n& ".join(re.sub(r"(?<!\\)\s+$", "", row) for row in rows) + "\\end{aligned}"
 
 
 def _rows(pieces: list[_Piece], width: float) -> list[str]:
-    """The lines of a formula: its relations each begin one, and what is too long between them goes on set in."""
+    """Return the lines of a formula: each relation begins one, and parts between them that are too long continue indented."""
     rows: list[str] = []
     for clause in _split(pieces, "relation", "comma"):
         if _width(clause) <= width:
@@ -201,7 +201,7 @@ def _rows(pieces: list[_Piece], width: float) -> list[str]:
 
 
 def _filled(terms: list[list[_Piece]], width: float) -> list[str]:
-    """Terms of a sum, as many to a line as there is room for; a term that is too long is broken between its factors."""
+    """Return the lines of a sum, as many terms per line as fit; a term that is too long is broken between its factors."""
     lines: list[str] = []
     room = 0.0
     for term in terms:
@@ -219,7 +219,7 @@ def _filled(terms: list[list[_Piece]], width: float) -> list[str]:
 
 
 def _factors(term: list[_Piece], width: float) -> list[str]:
-    """A product over several lines; a bracket that is too long for one has lines of its own inside."""
+    """Return the lines of a product; a bracket that is too long for one line is broken inside."""
     lines: list[str] = []
     room = 0.0
     for unit in _units(term):
@@ -239,7 +239,7 @@ def _factors(term: list[_Piece], width: float) -> list[str]:
 
 
 def _units(term: list[_Piece]) -> list[list[_Piece]]:
-    """Factors with the signs and prefixes before them."""
+    """Return factors with the signs and prefixes before them."""
     units: list[list[_Piece]] = []
     waiting = False
     for piece in term:
@@ -252,7 +252,7 @@ def _units(term: list[_Piece]) -> list[list[_Piece]]:
 
 
 def _split(pieces: list[_Piece], *kinds: str) -> list[list[_Piece]]:
-    """Parts that begin with a piece of these kinds; a comma ends one."""
+    """Return parts that begin with a piece of these kinds; a comma ends a part."""
     parts: list[list[_Piece]] = [[]]
     for piece in pieces:
         if piece.kind in kinds and piece.kind != "comma" and parts[-1]:
@@ -264,7 +264,7 @@ def _split(pieces: list[_Piece], *kinds: str) -> list[list[_Piece]]:
 
 
 def _begun(pieces: list[_Piece]) -> str:
-    """A line that may begin with a sign or a relation: set as one between two."""
+    """Return a line that may begin with a sign or a relation: set as one between two operands."""
     return ("{}" if pieces[0].kind in ("sign", "relation") else "") + _text(pieces)
 
 

@@ -1,4 +1,4 @@
-"""Plain text inside formulas of LaTeX: letters of the algebra as mathematics, which fonts of text may not have."""
+"""Plain text in LaTeX formulas: letters of the algebra as mathematics, since text fonts may lack them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ MATHEMATICS = {
     **{"⁻": "{}^-", "⁺": "{}^+", "¹": "{}^1", "²": "{}^2", "³": "{}^3", "ᵀ": r"{}^\top"},
     **{letter: f"{{}}_{digit}" for digit, letter in enumerate("₀₁₂₃₄₅₆₇₈₉")},
 }
-"""Letters that fonts of LaTeX may not have, in its mathematics."""
+"""Letters that LaTeX fonts may lack, as mathematics."""
 
 
 def escaped(text: str) -> str:
-    """Plain text for LaTeX's \\text: letters of the algebra as mathematics."""
+    """Return plain text for LaTeX's \\text: letters of the algebra as mathematics."""
     text = text.replace("\\", "").replace("_", "\\_").replace("⁻¹", "$^{-1}$").replace("*", "$^*$")
     for letter, latex in MATHEMATICS.items():
         text = text.replace(letter, f"${latex}$")

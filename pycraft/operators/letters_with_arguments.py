@@ -1,4 +1,4 @@
-"""Letters that are of something: of nodes by name, or of a coordinate."""
+"""Letters with arguments: names of nodes, or a coordinate."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class LetterWithArguments:
         self.__doc__ = NAMES[name].meaning
 
     def __call__(self, argument: str | int | Sequence[str], directions: Any = None, **of_frames: Any) -> _core.Operator:
-        """The operator of these nodes (or, of Delta, along this coordinate).
+        """Return the operator of these nodes (or, for Delta, along this coordinate).
 
-        Jacobian alone takes `relative_to`, `axes`, `coordinates`, of one frame, loose ones included: what `Frame.jacobian_operator` has.
+        Only Jacobian takes `relative_to`, `axes`, `coordinates`, for one frame, including loose ones: as `Frame.jacobian_operator`.
 
-        Lambda alone takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for
-        one node also names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, what resists motion along them
-        alone. It has a value where B*ΩB is singular, as for an arm of fewer than six hinges, if no motion along the directions is
-        impossible.
+        Only Lambda takes `directions`: the rows of C (k, 6 m), on the m nodes' motions stacked, angular first in each node's axes; for
+        one node also names among "rx", "ry", "rz", "x", "y", "z". Then it is (C B*ΩB C*)⁻¹: R^k → R^k, the inertia along these
+        directions. It exists even if B*ΩB is singular, as for an arm of fewer than six hinges, provided that every motion along the
+        directions is possible.
         """
         source = self._operators._source
         if of_frames:
@@ -57,13 +57,13 @@ class LetterWithArguments:
 def _relative_jacobian(
     soa: OperatorSet, name: str, frames: list[str], relative_to: Any = None, axes: Any = "body", coordinates: Any = None
 ) -> _core.Operator:
-    """The Jacobian of one frame relative to another."""
+    """Return the Jacobian of one frame relative to another."""
     if name != "Jacobian":
         raise _core.EvaluationError(f"{name} takes no relative_to, axes or coordinates; Jacobian does")
     if len(frames) != 1:
-        raise _core.ModelError(f"a Jacobian relative to a frame is of one frame, not {len(frames)}")
+        raise _core.ModelError(f"a Jacobian relative to a frame takes one frame, not {len(frames)}")
     if not isinstance(soa._source, _core.MultibodyOperators):
-        raise _core.ModelError(f"{soa._source.name!r} has no frames: it is no multibody model of its own")
+        raise _core.ModelError(f"{soa._source.name!r} has no frames: it is not a complete multibody model")
     return soa._model.frame(frames[0]).jacobian_operator(wrt=relative_to, axes=axes, coordinates=coordinates)
 
 
@@ -71,7 +71,7 @@ _TWIST = ("rx", "ry", "rz", "x", "y", "z")
 
 
 def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _core.Operator:
-    """(C B*ΩB C*)⁻¹ for the rows C of directions, or their names."""
+    """Return (C B*ΩB C*)⁻¹ for the rows C of directions, or their names."""
     named = [directions] if isinstance(directions, str) else directions
     if all(isinstance(d, str) for d in named):
         if len(nodes) != 1 or not set(named) <= set(_TWIST) or len(set(named)) < len(named):
@@ -83,14 +83,14 @@ def _directed_inertia(soa: OperatorSet, nodes: list[str], directions: Any) -> _c
     if rows.ndim != 2 or rows.shape[1] != 6 * len(nodes) or not len(rows):
         raise _core.EvaluationError(f"directions of {len(nodes)} nodes: rows (k, {6 * len(nodes)}), not {np.shape(directions)}")
     if np.linalg.matrix_rank(rows) < len(rows):
-        raise _core.EvaluationError(f"directions: the {len(rows)} rows are linearly dependent; leave out what the others say")
+        raise _core.EvaluationError(f"directions: the {len(rows)} rows are linearly dependent; omit the redundant ones")
     B = soa.B(nodes)
     C = _core.constant(rows, B.domain.dual, len(rows), "C")
     return (C @ B.T @ soa.Omega @ B @ C.T).inv()
 
 
 def listed_names(names: str | Sequence[str]) -> list[str]:
-    """One name or several as a list. ModelError for what is no name."""
+    """Return one name or several as a list. ModelError for an invalid name."""
     listed = several(names)
     for name in listed:
         if not isinstance(name, str):

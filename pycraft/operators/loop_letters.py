@@ -1,8 +1,8 @@
 """Rows of loops as operators, beside the letters of the tree that they are declared on (docs/loops.md).
 
-    Q = Σ Q_k : Θ → R^rows          A = Σ A_k : NodesV(ends) → R^rows          Q = A B* φ* H*   of loops of two ends
+    Q = Σ Q_k : Θ → R^rows          A = Σ A_k : NodesV(ends) → R^rows          Q = A B* φ* H*   for loops of two ends
 
-Q_k and A_k are the letters of the core, block diagonal, to the rows by body; Σ, ones, adds the parts of a row up.
+Q_k and A_k are the letters of the core, block diagonal, to the rows by body; Σ, ones, sums the parts of a row.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ NAMES = ("Q", "A")
 
 
 def loop_letter(source: Any, model: Any, name: str, made: dict[str, Any]) -> _core.Operator:
-    """Q or A of a model's loops; `made` keeps them as long as its loops stay."""
+    """Return Q or A of a model's loops; `made` caches them as long as its loops stay."""
     if not isinstance(source, _core.MultibodyOperators) or model is None:
         raise AttributeError(f"rows of loops are operators of a whole model, model.soa.{name}: {source.name!r} is none")
     loops = made.get("loops")
@@ -34,7 +34,7 @@ def loop_letter(source: Any, model: Any, name: str, made: dict[str, Any]) -> _co
 
 
 def loop_source(model: Any) -> _core.SkoSource:
-    """A source as it was pickled."""
+    """Rebuild a source from its pickle."""
     made: dict[str, Any] = model.soa._made
     loop_letter(model.soa._source, model, "Q", made)
     return made["loops"]

@@ -1,4 +1,4 @@
-"""The operator set of a model (`soa.phi`, `soa.H`, ...), and how expressions evaluate and display in Python."""
+"""The operator set of a model (`soa.phi`, `soa.H`, ...), and the evaluation and display of expressions in Python."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class OperatorSet(Closed):
     """The spatial operators of one model.
 
     Attributes are the book's letters in ASCII: ``E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega``,
-    ``I`` the identity, ``MM = H φ M φ* H*`` and its inverse ``MM_inv`` (where hinges have rotor inertias, the equations of motion have
-    ``MM + J``), the velocity-dependent ``Delta_theta_dot V_tilde V_bar momentum_cross H_dot``, the vectors ``theta_dot velocity a
-    b gravity_field gravity_base``, and ``X_world``; of loops ``Q`` and ``A``. With arguments: ``B(names)``, ``Jacobian(names)``,
-    ``Lambda(names)`` of nodes, ``Delta(coordinate)``. Spaces: ``Theta``, ``V``, ``F``, ``NodesV(names)``, ``NodesF(names)``. Calling the
-    set with a string of names returns a tuple.
+    ``I`` the identity, ``MM = H φ M φ* H*`` and its inverse ``MM_inv`` (if hinges have rotor inertias, the equations of motion have ``MM +
+    J``), the velocity-dependent ``Delta_theta_dot V_tilde V_bar momentum_cross H_dot``, the vectors ``theta_dot velocity a b gravity_field
+    gravity_base``, and ``X_world``; for loops ``Q`` and ``A``. With arguments: ``B(names)``, ``Jacobian(names)``, ``Lambda(names)`` of
+    nodes, ``Delta(coordinate)``. Spaces: ``Theta``, ``V``, ``F``, ``NodesV(names)``, ``NodesF(names)``. Calling the set with a string of
+    names returns a tuple.
 
     Examples
     --------
@@ -50,11 +50,11 @@ class OperatorSet(Closed):
 
     def __init__(self, source: _core.SkoSource, model: Any = None):
         self._source = source
-        self._model = model  # keeps the Python face alive: the core knows only its own half
+        self._model = model  # keeps the Python part alive: the core knows only its own part
         self._made: dict[str, _core.Operator] = {}
 
     def is_current(self) -> bool:
-        """Whether the model's structure is still the one these operators were made for."""
+        """True if the model's structure has not changed since these operators were made."""
         try:
             self._source.check_current()
         except _core.StaleOperatorError:
@@ -98,33 +98,33 @@ class OperatorSet(Closed):
         return [*NAMES, "I", *_COMPOSED, *_OF_LOOPS]
 
     def NodesV(self, names: str | Sequence[str]) -> _core.Space:
-        """Stacked motions of these nodes, six numbers each."""
+        """Return the space of stacked motions of these nodes, six components each."""
         return self._source.nodes_space(listed_names(names), True)
 
     def NodesF(self, names: str | Sequence[str]) -> _core.Space:
-        """Stacked forces on these nodes, six numbers each."""
+        """Return the space of stacked forces on these nodes, six components each."""
         return self._source.nodes_space(listed_names(names), False)
 
     def grouped(self, groups: Iterable[Iterable[str]]) -> OperatorSet:
-        """The operators of the same robot with some connected sets of bodies taken as one node each, beside single bodies.
+        """Return the operators of the same robot with some connected sets of bodies as one node each, beside single bodies.
 
         A group S of n bodies has blocks of 6n rows, ``H = H_S φ_S`` and ``M = M_S`` with ``φ_S = (I - E_S)⁻¹`` (the letters ``phi_S`` and
-        ``H_S``); bodies that no group names stay rigid ones with their own cheap blocks. Coordinates keep their order, and Θ is one space:
+        ``H_S``); other bodies stay single, with their own cheap blocks. Coordinates keep their order, and Θ is one space:
         ``arm.soa.MM - grouped.MM`` is an expression, and zero. V and F are other spaces, stacked group by group.
 
         Parameters
         ----------
         groups : names of bodies, group by group
-            Each must hang together by hinges, and a body belongs to one group.
+            Each must be connected by hinges, and a body belongs to one group.
 
         Raises
         ------
         ModelError
-            A body that is unknown, named twice, or that nothing of its group carries; a model that is no multibody system.
+            A body that is unknown, named twice, or not connected to its group; a model that is not a multibody system.
 
         Notes
         -----
-        Cost: a sweep takes O((6n)³) in a group, outside as much as before. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011,
+        Cost: a sweep takes O((6n)³) in a group, unchanged elsewhere. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011,
         the chapter on constraint embedding, here without constraints.
 
         Examples
@@ -138,32 +138,32 @@ class OperatorSet(Closed):
         True
         """
         if not isinstance(self._source, _core.MultibodyOperators):
-            raise _core.ModelError(f"bodies of {self._source.name!r} are not grouped: it is no multibody model of its own")
+            raise _core.ModelError(f"bodies of {self._source.name!r} cannot be grouped: it is not a complete multibody model")
         if isinstance(groups, (str, bytes)) or not isinstance(groups, Iterable):
             raise _core.ModelError(f"groups of {self._source.name!r}: a list of lists of bodies, not {groups!r}")
         named = [_listed_bodies(group, self._source.name) for group in groups]
         return OperatorSet(_core._grouped(self._source, named), self._model)
 
     def embedded(self, independent: Any = None, q: Any = None) -> Any:
-        """The operators of the model with its loops embedded: a tree without loops, on independent velocities θ̇_r.
+        """Return the operators of the model with its loops embedded: a tree without loops, on independent velocities θ̇_r.
 
-        The bodies around each loop, up to the nearest one that carries them all, are one node; loops with bodies in common are one set.
+        The bodies around each loop, up to their nearest common carrier, are one node; loops with bodies in common are one set.
         ``θ̇ = X_r θ̇_r``, ``X_r = [1; -Q_d⁻¹ Q_r]``, and ``H = X_r* H_S φ_S``, ``J = X_r* J_S X_r``, so that ``ℳ = X_r* ℳ_tree X_r``.
 
         Parameters
         ----------
         independent : names of coordinates or hinges
-            Around each set of loops as many as it leaves free, or none of them: then they are chosen by conditioning.
-        q : (nq,), or a State on the loops where that is done; the model's present one where it is left out.
+            Around each set of loops as many as it has freedoms, or none: then they are chosen by conditioning.
+        q : (nq,), or a State on the loops at which to choose; default: the model's present one.
 
         Raises
         ------
         ModelError
-            A state that is off the loops or singular, coordinates that do not tell where the others are; with such as do.
+            A state that is off the loops or singular, coordinates that do not determine the others; with a choice that does.
 
         Notes
         -----
-        The choice stays where q moves on: EvaluationError at a state where it is none. Cost: a sweep takes O((6n)³) in a set of n bodies.
+        The choice stays as q changes: EvaluationError at a state where it is invalid. Cost: a sweep takes O((6n)³) in a set of n bodies.
         Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the chapter on constraint embedding.
 
         Examples
@@ -181,20 +181,21 @@ class OperatorSet(Closed):
         return _core._face["embedded"](self, independent, q)
 
     def free(self, prescribed: Any) -> FreeOperators:
-        """The operators of the coordinates that are left free where others are prescribed: ``H_f``, ``D_f``, ``ψ_f``, ...
+        """Return the operators of the free coordinates with others prescribed: ``H_f``, ``D_f``, ``ψ_f``, ...
 
-        H keeps the rows of free coordinates, and every letter that H is in follows from that; φ and M are the same, on the same spaces V
-        and F, so that they combine with those of the model and of `prescribed`. Θ is the space of the free coordinates, in their order.
+        H keeps the rows of free coordinates, and every letter that contains H follows from that; φ and M are the same, on the same spaces V
+        and F, so that they combine with the letters of the model and of
+        `prescribed`. Θ is the space of the free coordinates, in their order.
 
         Parameters
         ----------
         prescribed : names of hinges, coordinates or patterns, or a list of them
-            As `Multibody.hybrid_dynamics` takes them.
+            As in `Multibody.hybrid_dynamics`.
 
         Raises
         ------
         ModelError
-            A name that is not there, a coordinate that is prescribed twice; a model that is no multibody system.
+            An unknown name, a coordinate that is prescribed twice; a model that is not a multibody system.
 
         Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, the chapter on prescribed motion; docs/hybrid_dynamics.md.
 
@@ -214,25 +215,25 @@ class OperatorSet(Closed):
         return FreeOperators(self, self._held(prescribed))
 
     def prescribed(self, prescribed: Any) -> OperatorSet:
-        """The operators of the prescribed coordinates, ``H_p`` and what it is in, the free ones locked; arguments and errors as `free`."""
+        """Return the operators of the prescribed coordinates, ``H_p`` and letters that contain it, with the free ones locked; as `free`."""
         return some_of(self, self._held(prescribed))
 
     def _held(self, prescribed: Any) -> list[bool]:
         if not isinstance(self._source, _core.MultibodyOperators):
-            raise _core.ModelError(f"coordinates of {self._source.name!r} are not prescribed: it is no multibody model of its own")
+            raise _core.ModelError(f"coordinates of {self._source.name!r} cannot be prescribed: it is not a complete multibody model")
         names = [text(getattr(one, "name", one), "what is prescribed") for one in several(prescribed)]
         return [bool(one) for one in _core.prescribed_by(self._source.model, names)]
 
     def random_state(self, rng: Any) -> Any:
-        """A state to try statements at."""
+        """Return a random state for trying statements."""
         return self._model.random_state(rng)
 
     def check(self, **options: Any):
-        """Check every theorem on this model, see `pycraft.identities.check_model`."""
+        """Check every theorem on this model; see `pycraft.identities.check_model`."""
         return _core._face["check_model"](self, **options)
 
     def theorems(self) -> list[_core.Theorem]:
-        """Every theorem as data: name, both sides as expressions, hypotheses, source. Of loops, too, where the model has some."""
+        """Return every theorem as data: name, both sides as expressions, hypotheses, source. Includes loops if the model has some."""
         theorems = list(_core.theorems(self._source))
         if isinstance(self._source, _core.MultibodyOperators) and len(getattr(self._model, "loops", ())):
             loop_letter(self._source, self._model, "Q", self._made)
@@ -248,7 +249,7 @@ class OperatorSet(Closed):
 
 
 def some_of(whole: OperatorSet, kept: Sequence[bool]) -> OperatorSet:
-    """The operators of the coordinates that are kept, the others locked."""
+    """Return the operators of the kept coordinates, with the others locked."""
     return OperatorSet(_core._some_coordinates(whole._source, list(kept)), whole._model)
 
 
@@ -265,13 +266,13 @@ def _listed_bodies(group: Any, model: str) -> list[str]:
     return names
 
 
-# ---------------------------------------------------------------------- what the core asks for
+# ---------------------------------------------------------------------- functions that the core calls
 def exact_numbers(parts: list[list[float]], shape: Sequence[int]) -> np.ndarray:
-    """Exact sums of doubles as an object array of mpmath numbers."""
+    """Return exact sums of doubles as an object array of mpmath numbers."""
     import mpmath
 
     out = np.empty(len(parts), dtype=object)
-    with mpmath.workprec(512):  # eight doubles hold less
+    with mpmath.workprec(512):  # eight doubles need less
         for i, terms in enumerate(parts):
             out[i] = mpmath.fsum(terms)
     return out.reshape(tuple(shape))
@@ -288,14 +289,14 @@ def scalar_at(
     precision: str | int = "double",
     threads: int = 1,
 ) -> _core.Scalar:
-    """The same scalar bound to a state, as Operator.at."""
+    """Return the same scalar bound to a state, as `Operator.at`."""
     return scalar.bound(_core._bind(scalar.operands(), q, v, form, refine, residual, precision, threads))
 
 
 def operator_from_parts(
     kind: int, payload: Any, children: list[_core.Operator], leaf_binding: _core.Binding | None = None
 ) -> _core.Operator:
-    """An operator from what it was pickled as; `leaf_binding` of zeros, identities, constants and vectors."""
+    """Rebuild an operator from its pickle; `leaf_binding` of zeros, identities, constants and vectors."""
     name = (
         "symbol",
         "vector",
@@ -326,7 +327,7 @@ def operator_from_parts(
 
 
 def operator_from_nodes(nodes: list[tuple[int, Any, list[int], _core.Binding | None]]) -> _core.Operator:
-    """An operator from all its nodes, parts before what they are parts of."""
+    """Rebuild an operator from all its nodes, children first."""
     made: list[_core.Operator] = []
     for kind, payload, children, leaf_binding in nodes:
         made.append(operator_from_parts(kind, payload, [made[i] for i in children], leaf_binding))
@@ -338,7 +339,7 @@ _SENSITIVITIES: WeakKeyDictionary[Any, _core.Sensitivities] = WeakKeyDictionary(
 
 
 def _sensitivities_of(model: Any) -> _core.Sensitivities:
-    """Of a model whose Python face may be gone: kept, as they keep what they recorded of batches."""
+    """Return the sensitivities of a model without its Python part: cached, as they keep their recordings of batches."""
     known = _SENSITIVITIES.get(model)
     if known is None:
         known = _SENSITIVITIES[model] = _core.Sensitivities(model)
@@ -346,17 +347,17 @@ def _sensitivities_of(model: Any) -> _core.Sensitivities:
 
 
 def scalar_gradient(scalar: _core.Scalar, over: str = "coordinates") -> np.ndarray:
-    """All derivatives of a scalar expression, see `Scalar.gradient`."""
+    """Return all derivatives of a scalar expression; see `Scalar.gradient`."""
     moved: Any = _core._moved(scalar.operands())
     if moved is None:
-        return np.zeros(())  # numbers alone: zero along whatever they are added to
+        return np.zeros(())  # constants: zero along every direction
     if isinstance(moved, _core.MultibodyOperators):
         return _gradient(scalar, over, moved)
-    return _along_coordinates(scalar, over, moved)  # embedded loops: all of it along the independent ones
+    return _along_coordinates(scalar, over, moved)  # embedded loops: everything along the independent ones
 
 
 def _gradient(scalar: _core.Scalar, over: str, source: _core.MultibodyOperators) -> np.ndarray:
-    """Term by term, so that ln det ℳ keeps a sweep of its own."""
+    """Differentiate term by term, so that ln det ℳ keeps its own sweep."""
     kind, value, operand, terms = scalar.kind, scalar.number, scalar.operand, scalar.terms
     if terms:
         parts = [_gradient(t, over, source) for t in terms]
@@ -379,13 +380,13 @@ def _gradient(scalar: _core.Scalar, over: str, source: _core.MultibodyOperators)
 
 def _along_coordinates(scalar: _core.Scalar, over: str, source: _core.SkoSource) -> np.ndarray:
     if over != "coordinates":
-        raise _core.EvaluationError(f"gradient over {over!r} is there for ln det of the mass matrix and of D, not for {scalar!r}")
+        raise _core.EvaluationError(f"gradient over {over!r} exists for ln det of the mass matrix and of D, not for {scalar!r}")
     count = source.Theta.dimension
     return np.stack([np.asarray(scalar.diff(i), float) for i in range(count)], axis=-1) if count else np.zeros(0)
 
 
 def _is_mass_matrix(operand: _core.Operator, source: _core.MultibodyOperators) -> bool:
-    """HφMφ*H*, with J where there is one, or D: what has the determinant of ℳ + J."""
+    """Check for HφMφ*H*, plus J if there is one, or D: operators with the determinant of ℳ + J."""
     if operand.sources != [source]:
         return False
     letters = [source.symbol(name) for name in ("H", "phi", "M", "J", "D")]

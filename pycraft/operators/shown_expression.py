@@ -1,4 +1,4 @@
-"""An expression as it shows itself in a notebook: its formula in lines, and below it spaces, structure and cost."""
+"""An expression in a notebook: its formula in lines, and below it spaces, structure and cost."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from .latex_lines import aligned, in_lines, lines_of
 from .latex_text import escaped
 
 _SEMIDEFINITE = {"M", "J", "P", "P_plus", "D", "R", "Upsilon", "Omega", "Lambda"}
-"""Letters x*Xx ≥ 0 of which is known of every model: inertias, and what projections, sums and A X A* make of them."""
+"""Letters with x*Xx ≥ 0 in every model: inertias, and projections, sums and A X A* of them."""
 _FACTORS = 500
-"""Characters of a formula up to which its structure is looked for: the rules read it part by part."""
+"""Largest number of characters of a formula with a search for structure: the rules read it part by part."""
 
 
 def formula_latex(latex: str) -> str:
-    """A formula as Jupyter takes it, broken where it is long."""
+    """Return a formula for Jupyter, broken into lines if it is long."""
     return f"$\\displaystyle {in_lines(latex)}$"
 
 
 def expression_latex(expression: Any, latex: str) -> str:
-    """`Operator._repr_latex_`: the formula; below it its spaces, what is known of its structure, and the cost of applying it once."""
+    """Implement `Operator._repr_latex_`: the formula; below it its spaces, its known structure, and the cost of applying it once."""
     rows = lines_of(latex)
     about = ",\\;\\,".join(filter(None, (_spaces(expression), _text(", ".join(structure(expression))), _cost(expression))))
     if about:
@@ -29,10 +29,10 @@ def expression_latex(expression: Any, latex: str) -> str:
 
 
 def structure(expression: Any) -> list[str]:
-    """What is known of an operator by its form alone, in words: "symmetric", "positive semidefinite", "upper triangular", ...
+    """Return the structure of an operator known from its form, in words: "symmetric", "positive semidefinite", "upper triangular", ...
 
-    Triangles are those of rows and columns from base to tip, as `blocks()` shows them. What is not said may still be so. Formulas of
-    more than some hundred characters are not looked into. Cost: in proportion to the formula.
+    Triangles are those of rows and columns from base to tip, as `blocks()` shows them. Properties that are not listed may still hold.
+    Formulas of more than some hundred characters are not searched. Cost: proportional to the formula.
 
     Examples
     --------
@@ -54,14 +54,14 @@ def structure(expression: Any) -> list[str]:
 
 
 def _semidefinite(e: Any) -> bool:
-    """Whether x*(e x) ≥ 0 for every x, by the form of e."""
+    """Check by the form of e that x*(e x) ≥ 0 for every x."""
     parts = e.children
     match e.kind:
         case "symbol":
             return e.name in _SEMIDEFINITE
         case "identity":
             return True
-        case "transpose" | "inverse" | "blockdiag":  # no root: it is a triangle
+        case "transpose" | "inverse" | "blockdiag":  # no root, which is a triangle
             return _semidefinite(parts[0])
         case "scaled":
             return e.coefficient > 0 and _semidefinite(parts[0])
@@ -75,12 +75,12 @@ def _semidefinite(e: Any) -> bool:
 
 
 def cost_words(plan: Any) -> tuple[str, str]:
-    """(order, flops) of a plan: "O(N)", "3.8 kflop"."""
+    """Return (order, flops) of a plan: "O(N)", "3.8 kflop"."""
     return "O(N³)" if plan.has_dense_step else "O(N)", flops_text(plan.flops)
 
 
 def flops_text(flops: float) -> str:
-    """Operations with their unit: 890 flop, 2.9 kflop.
+    """Return a number of operations with its unit: 890 flop, 2.9 kflop.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def _space(space: Any) -> str:
 
 
 def _cost(expression: Any) -> str:
-    """Of applying it to one vector; nothing where there is no plan: of I without a space, or of a model that has changed since."""
+    """Return the cost of applying it to one vector; empty without a plan: for I without a space, or a model that has changed since."""
     if expression.domain is None or len(repr(expression)) > _FACTORS:
         return ""
     try:

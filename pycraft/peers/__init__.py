@@ -1,4 +1,4 @@
-"""Other tools beside this one: what a model of theirs differs in, and both tools' numbers."""
+"""Comparison with other tools: differences between models, and results of both tools."""
 
 from .compare import ModelComparison, compare
 

@@ -1,4 +1,4 @@
-"""Cassie of example-robot-data as it is published: an SDF file, whose links hang together in loops by pins and balls.
+"""Cassie of example-robot-data as published: an SDF file, with links connected in loops by pins and balls.
 
 Source: Agility Robotics, cassie_v2.sdf.
 """
@@ -14,7 +14,7 @@ from ..models.multibody import Multibody
 
 
 def cassie_file() -> Path:
-    """Return where the installed example-robot-data has it. ModelError where it has none."""
+    """Return its path in the installed example-robot-data. ModelError if it is missing."""
     if "cassie_v2" not in (files := example_robots()):
         raise _core.ModelError("the installed example-robot-data has no Cassie")
     return files["cassie_v2"]

@@ -1,4 +1,4 @@
-"""The clock of what is timed beside other packages: one core, a warm-up, several rounds in turn, minimum and median."""
+"""The clock for timing beside other packages: one core, a warm-up, several rounds in turn, minimum and median."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ import numpy as np
 from .. import _core
 
 Clock: TypeAlias = Callable[[float], Mapping[str, float]]
-"""Times something for so many seconds: seconds a call, "minimum" and "median"."""
+"""Times a call for that many seconds: seconds per call, "minimum" and "median"."""
 
 
 class Time(NamedTuple):
-    """Of one call, microseconds: the least there was, and the least median of several rounds."""
+    """Time of one call, microseconds: the least of all, and the least median of several rounds."""
 
     minimum: float
     median: float
 
     def less(self, microseconds: float) -> Time:
-        """Without so much that is not the call's own; never below a nanosecond."""
+        """Return the time minus microseconds that are not the call's own; never below a nanosecond."""
         return Time(*(max(t - microseconds, 1e-3) for t in self))
 
     def shared(self, count: int) -> Time:
-        """Of one of so many that were timed together."""
+        """Return the time of one of `count` calls that were timed together."""
         return Time(self.minimum / count, self.median / count)
 
 
 def elapsed(f: Callable[[], Any], seconds: float) -> dict[str, float]:
-    """Seconds a call from Python: groups of calls that are long enough for the clock, after two calls to warm up."""
+    """Return seconds per call from Python: groups of calls that are long enough for the clock, after two calls to warm up."""
     f()
     begin = time.perf_counter()
     f()
@@ -48,14 +48,14 @@ def elapsed(f: Callable[[], Any], seconds: float) -> dict[str, float]:
 
 
 def in_turn(seconds: float, *clocks: Clock, rounds: int = 20) -> list[Time]:
-    """Each of several, one after the other for many short rounds: a machine's speed changes from one moment to the next."""
+    """Time several calls, one after the other for many short rounds: a machine's speed changes from one moment to the next."""
     found = [[clock(seconds / rounds) for clock in clocks] for _ in range(rounds)]
     of_each = zip(*found, strict=True)
     return [Time(*(1e6 * min(t[which] for t in times) for which in ("minimum", "median"))) for times in of_each]
 
 
 def pin_to_one_core() -> str:
-    """This process on one of its cores, where the system lets it; says in words what was done."""
+    """Pin this process to one of its cores, if the system permits; return the result in words."""
     if not hasattr(os, "sched_setaffinity"):
         return "not pinned: the system has no way to"
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
@@ -63,7 +63,7 @@ def pin_to_one_core() -> str:
 
 
 def machine() -> dict[str, str]:
-    """What is measured on: processor, its instruction set here, versions."""
+    """Return the machine of the measurement: processor, its instruction set here, versions."""
     model = platform.processor() or platform.machine()
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as info:

@@ -1,4 +1,4 @@
-"""`pycraft.compare`: one robot in two packages. What differs between the two models, in words, and what is left after that, in digits."""
+"""`pycraft.compare`: one robot in two packages: differences between the two models, in words, and the remaining ones, in digits."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .twins import MuJoCoTwin, OwnTwin, PinocchioTwin, Twin
 
 QUANTITIES = ("mass matrix", "inverse dynamics", "forward dynamics")
 SHOWN = 12
-"""Differences of one kind that a report prints; `.differences` has all."""
+"""Number of differences of one kind that a report prints; `.differences` has all."""
 
 
 class Difference(NamedTuple):
-    """One thing in which two models differ.
+    """One difference between two models.
 
-    `kind` says what; `physical`, whether it is more than a convention; `decides`, whether it alone makes the two move differently, which
-    what is compared in digits does not show.
+    `kind` names it; `physical`: whether it is more than a convention; `decides`: whether it alone makes the two move differently, although
+    the compared values do not show it.
     """
 
     kind: str
@@ -34,14 +34,14 @@ class Difference(NamedTuple):
 
 @dataclass
 class ModelComparison:
-    """What `pycraft.compare` found.
+    """The result of `pycraft.compare`.
 
-    True where the two models are one: all quantities are within their bounds once gravity and rotor inertia are the same, and no effect of
+    True if the two models are the same: all quantities are within their bounds once gravity and rotor inertia are equal, and no effect of
     the other model, such as damping or a tendon, moves it differently. Contacts and stops that act at none of the states are named and do
     not count.
 
-    `as_they_are` and `in_common` hold the largest relative difference of each quantity over the states: of the two packages' arrays
-    entry by entry, and after conventions, gravity and rotor inertias are made the same. `bounds` is what rounding may leave.
+    `as_they_are` and `in_common` hold the largest relative difference of each quantity over the states: of the two packages' arrays entry
+    by entry, and after conversion of conventions, gravity and rotor inertias. `bounds` are bounds on rounding.
     """
 
     ours: str
@@ -58,7 +58,7 @@ class ModelComparison:
 
     @property
     def worst(self) -> float:
-        """The largest relative difference that is left in common coordinates."""
+        """The largest relative difference that remains in common coordinates."""
         return max(self.in_common.values(), default=0.0)
 
     def __repr__(self) -> str:
@@ -80,22 +80,22 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
     """Compare a model with another package's model of the same robot.
 
     Hinges and joints are matched by name. Order of joints, quaternions, axes of velocities and cosine-sine pairs are conventions: they are
-    said, and converted. Gravity and rotor inertia (armature) are said, and taken from the other model in what is compared; v ×* (J v) of
-    rotors that the other package has not (docs/conventions.md) is said, and left out. Masses, centres of mass, inertias and placements that
-    differ are said with the body; then the numbers differ, too.
+    reported, and converted. Gravity and rotor inertia (armature) are reported, and taken from the other model for the comparison; v ×* (J
+    v) of rotors that the other package lacks (docs/conventions.md) is reported, and omitted. Masses, centres of mass, inertias and
+    placements that differ are reported with the body; then the values differ as well.
 
     Parameters
     ----------
     model : Multibody
-    other : a `pinocchio.Model` (also as `interop.export.to_pinocchio` gives it), a `mujoco.MjModel`, another Multibody, or the path of a
+    other : a `pinocchio.Model` (or the result of `interop.export.to_pinocchio`), a `mujoco.MjModel`, another Multibody, or the path of a
         TOML, URDF or MJCF file
     states : random states, drawn from `seed`
-    root : "fixed" or "free", of a URDF file; as `model` has it where left out
+    root : "fixed" or "free", for a URDF file; default: as in `model`
 
     Returns
     -------
     ModelComparison
-        Relative differences (in the largest entry) of the mass matrix, inverse and forward dynamics; bounds are 100 n eps, and times the
+        Relative differences (in the largest entry) of the mass matrix, inverse and forward dynamics; bounds are 100 n eps, times the
         condition of ℳ for the forward dynamics.
 
     Raises
@@ -112,7 +112,7 @@ def compare(model: Any, other: Any, *, states: int = 5, seed: int = 0, root: str
     (0, 0, 0) here, (0, -9.81, 0) there
     """
     if not hasattr(model, "forward_dynamics") or not hasattr(model, "hinges"):
-        raise _core.ModelError(f"compare's first model is a Multibody, not {type(model).__name__}")
+        raise _core.ModelError(f"the first model of compare must be a Multibody, not {type(model).__name__}")
     twin = _twin(model, other, root)
     rng = np.random.default_rng(seed)
     drawn = [model.random_state(rng) for _ in range(states)]
@@ -132,7 +132,7 @@ def _twin(model: Any, other: Any, root: str | None) -> Twin:
 
         first = next(iter(model.hinges.values()), None)
         free = first is not None and first.kind == "free" and first.name == "root"
-        return OwnTwin(model, load(other, root=root or ("free" if free and not is_toml(other) else "fixed")))  # TOML says so itself
+        return OwnTwin(model, load(other, root=root or ("free" if free and not is_toml(other) else "fixed")))  # TOML specifies it itself
     if hasattr(other, "forward_dynamics") and hasattr(other, "hinges"):
         return OwnTwin(model, other)
     if isinstance(other, PinocchioModel):
@@ -149,7 +149,7 @@ def _twin(model: Any, other: Any, root: str | None) -> Twin:
 
 
 def _in_common(model: Any, twin: Twin, result: ModelComparison) -> Any:
-    """Our model with the other's gravity and rotor inertias; what was changed is said."""
+    """Return our model with the other's gravity and rotor inertias; changes are reported."""
     common = copy.deepcopy(model)
     there = np.asarray(twin.gravity, float)
     if not np.allclose(there, model.gravity, rtol=1e-14, atol=0):
@@ -168,12 +168,12 @@ def _in_common(model: Any, twin: Twin, result: ModelComparison) -> Any:
 
 
 def _rotor_forces(common: Any, twin: Twin, v: np.ndarray) -> np.ndarray:
-    """v ×* (J v) (nv,) where the other package leaves it out."""
+    """Return v ×* (J v) (nv,) if the other package omits it."""
     return np.where(twin.lacks_rotor_forces(), common.rotor_forces(v), 0.0)
 
 
 def _bodies_apart(model: Any, twin: Twin, drawn: list[Any]) -> list[tuple[str, str]]:
-    """Bodies whose motion, mass, centre of mass or inertia differ, each seen in the body's own axes."""
+    """Report bodies with different motion, mass, centre of mass or inertia, each seen in the body's own axes."""
     found: list[tuple[str, str]] = []
     if not drawn:
         return found
@@ -203,7 +203,7 @@ def _bodies_apart(model: Any, twin: Twin, drawn: list[Any]) -> list[tuple[str, s
 
 
 def _compare_at(result: ModelComparison, model: Any, common: Any, twin: Twin, state: Any, u: np.ndarray) -> None:
-    """All quantities at one state, on arrays as each package has them and on our coordinates."""
+    """Compare all quantities at one state, on arrays in each package's form and on our coordinates."""
     q, v, n = state.q, state.v, model.nv
     T = twin.velocities(q)  # v_theirs = T v
     eps = float(np.finfo(float).eps)

@@ -1,4 +1,4 @@
-"""Code compiled for one model beside the call itself and other packages' calls: a table of what `pycraft bench --peers` measures."""
+"""Code compiled for one model beside the ordinary call and other packages' calls: a table of `pycraft bench --peers`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .clock import Time, elapsed, in_turn
 
 CALLS = ("forward_dynamics", "inverse_dynamics", "mass_matrix", "mass_matrix_inverse")
 LARGEST = 20
-"""Coordinates of the models that code is compiled for: beyond, straight lines gain little over loops."""
+"""Largest number of coordinates of compiled models: beyond, straight-line code gains little over loops."""
 
 
 @dataclass
@@ -36,17 +36,17 @@ class CompiledRow:
 
     @property
     def ratio(self) -> float | None:
-        """Pinocchio's time in C++ over that of the compiled call."""
+        """Pinocchio's time in C++ over the compiled call's."""
         return None if self.peer_kernel is None else self.peer_kernel.median / self.kernel.median
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         times = {name: getattr(self, name)._asdict() for name in ("kernel", "python", "ordinary")}
         return {**asdict(self), **times, "peer_kernel": self.peer_kernel and self.peer_kernel._asdict(), "ratio": self.ratio}
 
 
 def compiled_row(name: str, model: Any, call: str, states: tuple[np.ndarray, ...], peer: Time | None, seconds: float) -> CompiledRow:
-    """Built anew, checked against the call to rounding, then timed in turn with it. EvaluationError where they differ."""
+    """Compile it anew, check it against the call to rounding, then time it in turn with the call. EvaluationError if they differ."""
     before = os.environ.get("PYCRAFT_CACHE")
     with tempfile.TemporaryDirectory() as folder:
         os.environ["PYCRAFT_CACHE"] = str(Path(folder))

@@ -1,4 +1,4 @@
-"""What two models' files say beside bodies and hinges: damping, springs, friction, drives, forces on bodies, loops, what is not read."""
+"""Further differences between two models' files: damping, springs, friction, drives, forces on bodies, loops, unread elements."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ..models.loaders.left_aside import OFF, QUANTITIES
 from ..models.offers import BoxInFluid, HeldWeight
 
 _EPS = 1e-12
-"""Relative, of numbers that are the same: both files write all digits, and frames are turned on the way."""
+"""Relative tolerance for equal values: both files write all digits, and frames are rotated in between."""
 _BOUNDS = ("effort limit", "velocity limit")
 _ONE_SIDED = ("contacts", "stops at the limits")
 
 
 class Apart(NamedTuple):
-    """One thing that differs: `kind`, words for it, and whether it makes the two models move differently."""
+    """One difference: `kind`, words for it, and whether it makes the two models move differently."""
 
     kind: str
     text: str
@@ -25,15 +25,15 @@ class Apart(NamedTuple):
 
 
 def effects_apart(ours: Any, theirs: Any, one_sided_act: bool | None = None) -> list[Apart]:
-    """Return in what the effects of two models' files differ.
+    """Return the differences between the effects of two models' files.
 
     Parameters
     ----------
     ours, theirs : Multibody
         Matched by the names of hinges, else of bodies.
     one_sided_act : bool, optional
-        Whether contacts or stops act at a state that is looked at, where the other model is of a program in which all of its file acts.
-        Left out where it is one of this package, in which nothing of the file does that is not read.
+        Whether contacts or stops act at one of the states, if the other model belongs to a program that applies its whole file. Omitted for
+        a model of this package, which does not apply unread elements.
     """
     found = [*_by_coordinate(ours, theirs), *_on_bodies(ours, theirs), *_drives(ours, theirs), *_loops(ours, theirs)]
     if one_sided_act is None:
@@ -49,7 +49,7 @@ def _by_coordinate(ours: Any, theirs: Any) -> Iterator[Apart]:
     places = _places(ours, theirs)
     for quantity in QUANTITIES:
         if quantity in _BOUNDS:
-            continue  # of drives that give nothing yet
+            continue  # drives that give no force yet
         own = np.nan_to_num(ours.left_aside.get(quantity, np.zeros(ours.nv)))
         other = np.zeros(ours.nv)
         if quantity in theirs.left_aside:
@@ -63,7 +63,7 @@ def _by_coordinate(ours: Any, theirs: Any) -> Iterator[Apart]:
 
 
 def _places(ours: Any, theirs: Any) -> np.ndarray:
-    """Return by our coordinate the number of theirs, -1 for none."""
+    """Return, by our coordinate, the number of theirs, -1 for none."""
     places = np.full(ours.nv, -1)
     by_body = {hinge.body.name: hinge for hinge in theirs.hinges.values()}
     for name, hinge in ours.hinges.items():
@@ -87,7 +87,7 @@ def _on_bodies(ours: Any, theirs: Any) -> Iterator[Apart]:
 
 
 def _held(model: Any) -> dict[str, np.ndarray]:
-    """By body the mass that is held, and that mass times its point, both times the gravity."""
+    """Return, by body, the compensated mass, and that mass times its point, both times the gravity."""
     found: dict[str, np.ndarray] = {}
     for offer in (offer for offer in model.offers if isinstance(offer, HeldWeight)):
         body, X = _carrier(model, offer.body)
@@ -97,7 +97,7 @@ def _held(model: Any) -> dict[str, np.ndarray]:
 
 
 def _boxes(model: Any) -> dict[str, np.ndarray]:
-    """By body the sums over its boxes of numbers that tell them apart."""
+    """Return, by body, sums over its boxes that distinguish them."""
     found: dict[str, np.ndarray] = {}
     for offer in (offer for offer in model.offers if isinstance(offer, BoxInFluid)):
         body, X = _carrier(model, offer.body)
@@ -118,7 +118,7 @@ def _listed(found: dict[str, np.ndarray]) -> str:
 
 
 def _drives(ours: Any, theirs: Any) -> Iterator[Apart]:
-    """Actuators that only one of the two has; those that give no force while controls are at zero do not decide."""
+    """Yield actuators that only one of the two has; those without force at zero controls do not decide."""
     sides = ((theirs, ours, "there"), (ours, theirs, "here"))
     for model, other, side in sides:
         known = [_key(drive) for drive in other.actuators]

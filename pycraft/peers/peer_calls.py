@@ -1,7 +1,7 @@
-"""What other packages compute of a model of ours, as calls without arguments to be timed, and their values as we write them.
+"""Computations of other packages on our models, as calls without arguments for timing, and their values in our form.
 
-A call that is timed gets what it takes in the package's own order: nothing is converted while the clock runs. Each of these classes has
-`name` and `calls(q, v, u, X)`; a package has the calls of its own that give the same thing, and no others.
+A timed call gets arguments in the package's own order: nothing is converted while the clock runs. Each of these classes has `name` and
+`calls(q, v, u, X)`; a package has only its own calls with equal results.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from ..interop.peer import PeerRefusal
 from .clock import Clock, elapsed
 
 ONE_THREAD = 64
-"""States of a batch that Pinocchio computes on one thread, for the time that a call takes in C++."""
+"""Number of states of a batch that Pinocchio computes on one thread, for the time of a call in C++."""
 
 
 _ANGULAR = [3, 4, 5, 0, 1, 2]  # first
 
 
 class Call(NamedTuple):
-    """A package's call: what is timed, its value as we write it, and how many arrays of the size of ℳ its bindings copy."""
+    """A package's call: the function to time, its value in our form, and how many arrays of the size of ℳ its bindings copy."""
 
     run: Callable[[], Any]
     value: Callable[[], tuple[np.ndarray, ...]]
@@ -39,7 +39,7 @@ def _full(upper: np.ndarray) -> np.ndarray:
 
 
 class PinocchioCalls:
-    """Pinocchio's calls on a model. MissingPackageError where it is not installed; PeerRefusal for a model that it does not take."""
+    """Pinocchio's calls on a model. MissingPackageError if it is not installed; PeerRefusal for a model that it refuses."""
 
     name = "Pinocchio"
 
@@ -103,7 +103,7 @@ class PinocchioCalls:
                 lambda: (square(pin.computeCoriolisMatrix(model, data, q, v)),),
                 copies=1,
             ),
-            "operational_space_inertia": Call(  # without the inverse, which is NumPy's from Python and takes longer there
+            "operational_space_inertia": Call(  # without the inverse, which from Python is NumPy's and slower
                 lambda: pin.computeDelassusMatrix(model, data, q, *tip),
                 lambda: inertia(tip, 1),
             ),
@@ -118,7 +118,7 @@ class PinocchioCalls:
         }
 
     def _held(self, bodies: Iterable[tuple[int, Any]]) -> tuple[Any, Any]:
-        """Constraints of these bodies in all directions, and their data: what a Delassus matrix is of."""
+        """Return constraints of these bodies in all directions, and their data, for a Delassus matrix."""
         pin, held, data = self.pin, self.pin.StdVec_RigidConstraintModel(), self.pin.StdVec_RigidConstraintData()
         for joint, placement in bodies:
             held.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_6D, self.model, joint, placement, pin.LOCAL))
@@ -126,7 +126,7 @@ class PinocchioCalls:
         return held, data
 
     def bindings(self, call: str) -> Callable[[], Any]:
-        """The call on a model without joints: what that takes is not the call's own work. One joint where it needs one."""
+        """Return the call on a model without joints: its time is not the call's own work. One joint if the call needs one."""
         pin, empty = self.pin, object.__new__(PinocchioCalls)
         empty.pin, empty.model = pin, pin.Model()
         if call.startswith("operational_space_inertia"):
@@ -137,7 +137,7 @@ class PinocchioCalls:
         return empty._calls(none, none, none, np.zeros((len(none), 1)), np.arange(len(none)), ((len(none), pin.SE3.Identity()),))[call].run
 
     def in_cpp(self, call: str, q: np.ndarray, v: np.ndarray, u: np.ndarray) -> tuple[Clock, int] | None:
-        """A clock of so many states (q, v, u) in a loop in C++ on one thread; None where the package has no such loop."""
+        """Return a clock of these states (q, v, u) in a loop in C++ on one thread; None if the package has no such loop."""
         loops = {"forward_dynamics": "abaInParallel", "inverse_dynamics": "rneaInParallel"}
         if call not in loops or not hasattr(self.pin, loops[call]) or self.model.nv > 100:  # its pool doubles the work space
             return None
@@ -152,7 +152,7 @@ class PinocchioCalls:
 
 
 class MuJoCoCalls:
-    """MuJoCo's calls on a model, contacts and constraints off. PeerRefusal for a model that it does not take."""
+    """MuJoCo's calls on a model, contacts and constraints off. PeerRefusal for a model that it refuses."""
 
     name = "MuJoCo"
 
@@ -208,7 +208,7 @@ class MuJoCoCalls:
 
 
 class DrakeCalls:
-    """Drake's calls on a continuous plant. PeerRefusal for a model that it does not take."""
+    """Drake's calls on a continuous plant. PeerRefusal for a model that it refuses."""
 
     name = "Drake"
 
@@ -216,7 +216,7 @@ class DrakeCalls:
         self.plant, self.of_q, self.of_v = drake_plant(model)
 
     def calls(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, X: np.ndarray) -> dict[str, Call]:
-        """Each sets its state, without which the plant gives what it remembers."""
+        """Return the calls; each sets its state, without which the plant returns cached results."""
         from pydrake.multibody.tree import MultibodyForces
 
         plant, of_v, nv = self.plant, self.of_v, len(self.of_v)
@@ -250,7 +250,7 @@ Package: TypeAlias = type[PinocchioCalls] | type[MuJoCoCalls] | type[DrakeCalls]
 
 
 def other_packages(leave_out: Callable[[str], None]) -> list[Package]:
-    """What makes a package's calls of a model: Pinocchio first, then what else is installed; what is not is said."""
+    """Return constructors of packages' calls: Pinocchio first, then others that are installed; missing ones are reported."""
     required("pinocchio", "peers", "comparison with Pinocchio needs")
     makers: list[Package] = [PinocchioCalls]
     others: tuple[tuple[str, Package, str], ...] = (("mujoco", MuJoCoCalls, "'pycraft-soa[peers]'"), ("pydrake", DrakeCalls, "drake"))

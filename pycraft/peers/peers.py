@@ -1,7 +1,8 @@
 """Every robot of example-robot-data against Pinocchio: mass matrix, inverse, inverse and forward dynamics, Jacobians.
 
 Bounds: 100 N eps relative for ℳ, inverse dynamics and Jacobians, times cond(ℳ) for the inverse and the forward dynamics. A
-disagreement beyond its bound is settled in quad precision: both are compared with the same call there, and the table says who was off.
+disagreement beyond its bound is settled in quad precision: both are compared with the same call there, and the table shows which one was
+off.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ QUANTITIES = ("mass matrix", "inverse dynamics", "Jacobians", "inverse", "forwar
 
 @dataclass
 class Comparison:
-    """One robot, one root: worst relative differences over states in units of their bounds, or why it was not compared."""
+    """One robot, one root: worst relative differences over states in units of their bounds, or the reason for no comparison."""
 
     robot: str
     root: str
@@ -46,14 +47,14 @@ class Comparison:
 
 
 def robot_files() -> list[Path]:
-    """Return every URDF file of the installed example-robot-data. ModelError where it is not installed."""
+    """Return every URDF file of the installed example-robot-data. ModelError if it is not installed."""
     for folder in example_folders():
         return sorted(folder.rglob("*.urdf"))
     raise _core.ModelError("example-robot-data is not installed: pip install 'pycraft-soa[peers]'")
 
 
 def compare(path: Path, root: str, states: int = 20, seed: int = 0) -> Comparison:
-    """One robot against Pinocchio at `states` random states."""
+    """Compare one robot with Pinocchio at `states` random states."""
     from ..models.loaders.load import load
     from ..models.warning import ModelWarning
 
@@ -89,7 +90,7 @@ def compare(path: Path, root: str, states: int = 20, seed: int = 0) -> Compariso
 
 
 def _compare_at(result: Comparison, model: Any, twin: convention.Coordinates, state: Any, rng: np.random.Generator) -> None:
-    """All quantities at one state."""
+    """Compare all quantities at one state."""
     pinocchio = required("pinocchio", "peers", "comparison with Pinocchio needs")
 
     pin_model = twin.pin_model
@@ -97,7 +98,7 @@ def _compare_at(result: Comparison, model: Any, twin: convention.Coordinates, st
     q, v, u = state.q, state.v, rng.uniform(-1, 1, model.nv)
     pq, S = twin.q(q), twin.velocities(q)
     pv, pu = S @ v, S @ u
-    # Pinocchio's Python functions fill the upper triangle alone.
+    # Pinocchio's Python functions fill only the upper triangle.
     pm, minverse = (
         np.triu(A) + np.triu(A, 1).T for A in (pinocchio.crba(pin_model, data, pq), pinocchio.computeMinverse(pin_model, data, pq))
     )
@@ -149,13 +150,13 @@ def _judge(result: Comparison, name: str, mine: Callable[[str], np.ndarray], the
         note = f"{name}: differ by {difference:.0e}; from quad precision {own:.0e} here, {peer:.0e} in Pinocchio"
         if note not in result.settled and len(result.settled) < 3:
             result.settled.append(note)
-        ratio = own / bound  # what counts is our own error
+        ratio = own / bound  # our own error counts
     result.ratio[name] = max(result.ratio.get(name, 0.0), ratio)
     result.largest[name] = max(result.largest.get(name, 0.0), difference)
 
 
 def compare_all(states: int = 20, seed: int = 0, progress: Callable[[str], None] | None = None) -> list[Comparison]:
-    """Every robot, fixed and floating. MissingPackageError without Pinocchio."""
+    """Compare every robot, fixed and floating. MissingPackageError without Pinocchio."""
     required("pinocchio", "peers", "comparison with Pinocchio needs")
     results = []
     for path in robot_files():
@@ -167,7 +168,7 @@ def compare_all(states: int = 20, seed: int = 0, progress: Callable[[str], None]
 
 
 def markdown(results: list[Comparison], states: int) -> str:
-    """The table that is committed."""
+    """Return the committed table."""
     compared = [r for r in results if not r.refused]
     refused = [r for r in results if r.refused]
     lines = [

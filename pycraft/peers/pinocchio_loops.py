@@ -1,4 +1,4 @@
-"""Pinocchio's forward dynamics with loops, as a call to be timed: `constraintDynamics` with points that stay together."""
+"""Pinocchio's forward dynamics with loops, as a call for timing: `constraintDynamics` with coincident points."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Point = tuple[str, Any]
 
 
 class PinocchioLoops:
-    """A model in Pinocchio with points of two bodies each held together. MissingPackageError where it is not installed.
+    """A model in Pinocchio with pairs of points of two bodies held together. MissingPackageError if it is not installed.
 
     Parameters
     ----------
-    model : a tree; its own loops do not go over
+    model : a tree; its own loops are ignored
     together : pairs of points, each of a body's name and (3,) in its frame (m)
     accuracy : of its proximal iterations, which redundant rows need
     """
@@ -44,7 +44,7 @@ class PinocchioLoops:
 
     @classmethod
     def of_balls(cls, model: Any, accuracy: float = 1e-10) -> PinocchioLoops:
-        """With the loops of a model, each a ball between two bodies. ModelError names another one."""
+        """Build it with the loops of a model, each a ball between two bodies. ModelError names any other loop."""
         together: list[tuple[Point, Point]] = []
         for loop in model.loops._description():
             if loop["kind"] != "ball" or not {loop["a"], loop["b"]} <= set(model.bodies):
@@ -55,12 +55,12 @@ class PinocchioLoops:
         return cls(model, together, accuracy)
 
     def call(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> Callable[[], np.ndarray]:
-        """Accelerations at a state, in Pinocchio's order: nothing is converted while a clock runs."""
+        """Return accelerations at a state, in Pinocchio's order: nothing is converted while a clock runs."""
         of = self._twin.of_v
         place, rate, force = self._twin.q(q), np.ascontiguousarray(v[of]), np.ascontiguousarray(tau[of])
         given = self._twin.model, self._work, place, rate, force, self._rows, self._data, self._settings
         return lambda: self._pin.constraintDynamics(*given)
 
     def ours(self, vdot: np.ndarray) -> np.ndarray:
-        """Accelerations in our order."""
+        """Return accelerations in our order."""
         return vdot[np.argsort(self._twin.of_v)]

@@ -1,9 +1,10 @@
-"""Direct calls beside other packages' on the same models, in one run: what `pycraft bench --peers` measures.
+"""Direct calls beside other packages' on the same models, in one run: the measurements of `pycraft bench --peers`.
 
-Every figure is the least of several medians, and what a ratio compares is timed in turn. Ours are timed inside C++, checks included, one
-state after another of a set, and from Python. A peer is what is installed: calls from Python. For forward and inverse dynamics Pinocchio
-has loops in C++ over states, which give its time in C++; of its other calls that time is the one from Python less what the bindings take on
-a model without joints, and less the copies of matrices that they make. Each result is checked against the peer's before it is timed.
+Every figure is the least of several medians, and calls that a ratio compares are timed in turn. Ours are timed inside C++, checks included,
+one state after another of a set, and from Python. Peers are installed packages, called from Python. For forward and inverse dynamics
+Pinocchio has loops in C++ over states, which give its time in C++; for its other calls that time is the time from Python minus the
+bindings' time on a model without joints, and minus the copies of matrices that they make. Each result is checked against the peer's before
+it is timed.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ STATES = 8
 BATCH = 1024
 COLUMNS = 64
 WRONG = 1e-6
-"""Two packages' results differ by less, relative to the largest entry, or nothing is timed."""
+"""Largest relative difference of two packages' results, of the largest entry; beyond, nothing is timed."""
 
 GOALS: dict[str, tuple[float | None, float | None]] = {  # times faster than the fastest peer: in C++; from Python
     "forward_dynamics": (3.0, 2.0),
@@ -43,7 +44,7 @@ GOALS: dict[str, tuple[float | None, float | None]] = {  # times faster than the
     "mass_matrix_inverse_product": (None, None),
 }
 BATCH_GOALS = {"baseline": (None, None), "avx2": (6.0, 10.0), "avx512": (12.0, 20.0)}
-"""Of a state of a batch over one call of the peer in C++, in double and in single precision, by instruction set."""
+"""Goals for a state of a batch over one call of the peer in C++, in double and in single precision, by instruction set."""
 
 
 @dataclass
@@ -71,7 +72,7 @@ class Row:
 
     @property
     def met(self) -> tuple[bool | None, bool | None]:
-        """Whether the goals are met, in C++ and from Python; None where there is no goal or no peer."""
+        """Return whether the goals are met, in C++ and from Python; None without a goal or a peer."""
         goals, ratios = GOALS[self.call], (self.ratio, self.python_ratio)
         cpp, python = (None if goal is None or ratio is None else ratio >= goal for goal, ratio in zip(goals, ratios, strict=True))
         return cpp, python
@@ -90,7 +91,7 @@ class BatchRow:
 
 @dataclass
 class Measured:
-    """All of a run."""
+    """All results of a run."""
 
     machine: dict[str, str]
     rows: list[Row] = field(default_factory=list)
@@ -99,7 +100,7 @@ class Measured:
     compiled: list[CompiledRow] = field(default_factory=list)
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data: times in microseconds, with ratios, goals met and fitted exponents."""
+        """Return plain data: times in microseconds, with ratios, goals met and fitted exponents."""
         rows = []
         for row in self.rows:
             times: dict[str, Any] = {"kernel": row.kernel._asdict(), "python": row.python._asdict()}
@@ -113,19 +114,19 @@ class Measured:
         return {**asdict(self), "unit": "microseconds", "rows": rows, "batches": batches, "compiled": compiled, "exponents": fitted}
 
     def leave_out(self, text: str) -> None:
-        """Say once what is not compared, and why."""
+        """Report once a call that is not compared, and the reason."""
         if text not in self.left_out:
             self.left_out.append(text)
 
 
 def states_of(model: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q (8, nq), v and u (8, nv): the states that are timed."""
+    """Return q (8, nq), v and u (8, nv): the timed states."""
     states = [model.random_state(seed) for seed in range(STATES)]
     return np.array([s.q for s in states]), np.array([s.v for s in states]), np.array([s.v for s in states[::-1]])
 
 
 class OwnCalls:
-    """Our calls on a model at the first of its states, as they are fastest from Python, and their clocks in C++."""
+    """Our calls on a model at the first of its states, in their fastest form from Python, and their clocks in C++."""
 
     def __init__(self, model: Any, states: tuple[np.ndarray, np.ndarray, np.ndarray]):
         self.model, self.states = model, states
@@ -141,7 +142,7 @@ class OwnCalls:
 
     @property
     def calls(self) -> list[str]:
-        """Of `GOALS` what the model has at every state: two nodes may not move in every direction independently."""
+        """Calls of `GOALS` that the model has at every state: two nodes may not move in every direction independently."""
         Q = self.states[0]
         try:
             self.model.operational_space_inertia(self.both, Q)
@@ -150,7 +151,7 @@ class OwnCalls:
         return list(GOALS)
 
     def run(self, call: str) -> Any:
-        """The call itself."""
+        """Return the result of the call."""
         model, q, v, u = self.model, self.q, self.v, self.u
         match call:
             case "forward_dynamics" | "inverse_dynamics":
@@ -169,7 +170,7 @@ class OwnCalls:
         return getattr(model, call)(q, v, u)
 
     def from_python(self, call: str) -> Callable[[], Any]:
-        """What is timed: nothing is looked up while the clock runs."""
+        """Return the function to time: nothing is looked up while the clock runs."""
         model, q, v, u, vector, matrix = self.model, self.q, self.v, self.u, self.vector, self.matrix
         tip, square = self.tip, self.square
         own = getattr(model, call, None)
@@ -187,7 +188,7 @@ class OwnCalls:
         return lambda: own(q, v, u)  # type: ignore[misc]  # a call of the model
 
     def in_cpp(self, call: str) -> Clock:
-        """A clock without Python in the loop."""
+        """Return a clock without Python in the loop."""
         if call == "mass_matrix_inverse_product":
             self.model.q = self.q
             return partial(_core.time_apply, self.inverse, self.X)
@@ -195,7 +196,7 @@ class OwnCalls:
 
 
 def _checked(name: str, call: str, given: Any, expected: tuple[np.ndarray, ...], whose: str) -> float:
-    """The largest relative difference of a call's arrays. Raises EvaluationError where they are not the same."""
+    """Return the largest relative difference of a call's arrays. Raises EvaluationError if they differ."""
     ours = given if isinstance(given, tuple) else (given,)
     worst = 0.0
     for mine, other in zip(ours, expected, strict=True):
@@ -208,7 +209,7 @@ def _checked(name: str, call: str, given: Any, expected: tuple[np.ndarray, ...],
 
 
 def _checked_alone(name: str, call: str, own: OwnCalls) -> float:
-    """Where no peer goes: against extended precision; derivatives against each other, ℳ ∂v̇ = -∂τ at the accelerations of τ."""
+    """Check without a peer: against extended precision; derivatives against each other, ℳ ∂v̇ = -∂τ at the accelerations of τ."""
     model, q, v, u = own.model, own.q, own.v, own.u
     exact = partial(getattr(model, call, model.mass_matrix_inverse), precision="extended")
     match call:
@@ -232,13 +233,13 @@ def _checked_alone(name: str, call: str, own: OwnCalls) -> float:
     for slope, force in zip(slopes[:2], forces[:2], strict=True):
         error = float(np.abs(M @ slope + force).max() / (np.abs(M) @ np.abs(slope)).max())
         if not error < WRONG:
-            raise _core.EvaluationError(f"derivatives of {name} do not belong together in the run that times them: off by {error:.1e}")
+            raise _core.EvaluationError(f"derivatives of {name} are inconsistent in the run that times them: off by {error:.1e}")
         worst = max(worst, error)
     return worst
 
 
 def measured_row(name: str, own: OwnCalls, call: str, peers: dict[str, Call], seconds: float, pinocchio: Any = None) -> Row:
-    """One call on one model, checked, then timed in turn with the peers'. `pinocchio`: its calls, for its time in C++."""
+    """Return one call on one model, checked, then timed in turn with the peers'. `pinocchio`: its calls, for its time in C++."""
     row = Row(name, own.model.nv, call, Time(0.0, 0.0), Time(0.0, 0.0))
     for peer, other in peers.items():
         row.errors[peer] = _checked(name, call, own.run(call), other.value(), f"{peer}'s")
@@ -257,7 +258,7 @@ def measured_row(name: str, own: OwnCalls, call: str, peers: dict[str, Call], se
 
 
 def _not_its_own(pinocchio: Any, call: str, copies: int, n: int, seconds: float) -> float:
-    """What Pinocchio's bindings take of a call, microseconds: of the call without joints, and of copies of a matrix n by n."""
+    """Return the time of Pinocchio's bindings in a call, microseconds: the call without joints, and copies of an n by n matrix."""
     bare, empty, matrix = pinocchio.bindings(call), np.empty((0, 0)), np.empty((n, n))
     if not copies:
         return in_turn(seconds / 4, partial(elapsed, bare))[0].median
@@ -292,7 +293,7 @@ def _compiled(found: Measured, name: str, own: OwnCalls, seconds: float) -> None
 
 
 def measure(seconds: float = 0.1, quick: bool = False, progress: Callable[[str], None] = lambda text: None) -> Measured:
-    """All figures, `seconds` for each; `quick`: two robots and two short chains. MissingPackageError where Pinocchio is not installed."""
+    """Return all figures, `seconds` for each; `quick`: two robots and two short chains. MissingPackageError without Pinocchio."""
     found = Measured(machine() | {"cores": pin_to_one_core()})
     makers = other_packages(found.leave_out)
     for name, model in timed_models(quick, found.leave_out):
@@ -321,11 +322,11 @@ def measure(seconds: float = 0.1, quick: bool = False, progress: Callable[[str],
 
 
 FITTED_FROM = 30
-"""Links of the shortest chain that an exponent is fitted to."""
+"""Links of the shortest chain in the fit of an exponent."""
 
 
 def exponents(rows: list[Row], peer: bool = False) -> dict[str, float]:
-    """By call the fitted p of time ~ N^p in C++, ours or Pinocchio's, on chains of 30 links and more."""
+    """Return by call the fitted p of time ~ N^p in C++, ours or Pinocchio's, on chains of 30 links and more."""
     fitted = {}
     for call in dict.fromkeys(row.call for row in rows):
         chains = [row for row in rows if row.call == call and row.model.startswith("chain") and row.nv >= FITTED_FROM]

@@ -1,4 +1,4 @@
-"""What is timed beside other packages: robots, and chains of growing length."""
+"""Models for timing beside other packages: robots, and chains of growing length."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .peers import GRAVITY, robot_files
 
 CHAINS = (10, 30, 100, 300, 1000)
 LONGEST = (10_000, 100_000)
-"""Chains that only calls of cost O(N) are timed on."""
+"""Chains for timing only calls of cost O(N)."""
 AXES = np.eye(3)[[1, 0, 2]]
 ELSEWHERE = {"ANYmal": ("anymal_b_simple_description", "anymal"), "Talos": ("talos_data", "talos_full_v2")}
 """Robots of example-robot-data, each by its folder and its file; on a free base."""
 
 
 def chain_of_machines(n: int) -> Multibody:
-    """A chain of n pins about y, x and z in turn, as in machines: links of 0.5 to 1 kg and 0.1 m, no symmetry.
+    """Return a chain of n pins about y, x and z in turn, as in machines: links of 0.5 to 1 kg and 0.1 m, no symmetry.
 
-    Other packages have their fastest joints for coordinate axes, so none is slowed by how the chain is drawn.
+    Other packages have their fastest joints for coordinate axes, so the choice of axes slows none of them.
     """
     model = Multibody(f"chain of {n}")
     inertia = np.array([[2e-3, 1e-4, 0], [1e-4, 1.8e-3, 1e-4], [0, 1e-4, 8e-4]])
@@ -44,7 +44,7 @@ def chain_of_machines(n: int) -> Multibody:
 
 
 def timed_models(quick: bool, leave_out: Callable[[str], None]) -> Iterator[tuple[str, Any]]:
-    """Every model with its name, gravity along -z; what cannot be had is said. `quick`: two robots and two short chains."""
+    """Yield every model with its name, gravity along -z; missing ones are reported. `quick`: two robots and two short chains."""
     for name, model in _robots(quick, leave_out):
         model.gravity = GRAVITY
         yield name, model

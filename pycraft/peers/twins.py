@@ -1,4 +1,4 @@
-"""The same robot in another package, on our coordinates: what `compare` asks of Pinocchio, MuJoCo and another model of ours.
+"""The same robot in another package, on our coordinates: the part of Pinocchio, MuJoCo and another model of ours in `compare`.
 
 Velocities of the two are related by the orthogonal matrix T(q), v_theirs = T v; forces follow by duality, τ_theirs = T τ.
 """
@@ -19,7 +19,7 @@ from .effects_apart import Apart, effects_apart
 
 
 class BodyData(NamedTuple):
-    """A moving body with what is welded to it: the pose (4, 4) of its frame in the world; mass, centre of mass, inertia about it."""
+    """A moving body with everything welded to it: the pose (4, 4) of its frame in the world; mass, centre of mass, inertia about it."""
 
     pose: np.ndarray
     mass: float
@@ -27,13 +27,13 @@ class BodyData(NamedTuple):
     inertia: np.ndarray
 
     def seen_from(self, X: np.ndarray) -> BodyData:
-        """In a frame from which this body's frame lies at X (4, 4)."""
+        """Return the data in a frame relative to which this body's frame has the pose X (4, 4)."""
         R, p = X[:3, :3], X[:3, 3]
         return BodyData(self.pose @ np.linalg.inv(X), self.mass, R @ self.com + p, R @ self.inertia @ R.T)
 
 
 class Twin(ABC):
-    """Another model of the same robot. `gravity` (3,), `armature` (nv,) in our order; arrays go in and out on our coordinates."""
+    """Another model of the same robot. `gravity` (3,), `armature` (nv,) in our order; arrays are on our coordinates."""
 
     name: str
     gravity: np.ndarray
@@ -41,7 +41,7 @@ class Twin(ABC):
 
     @abstractmethod
     def velocities(self, q: np.ndarray) -> np.ndarray:
-        """T (nv, nv)."""
+        """Return T (nv, nv)."""
 
     @abstractmethod
     def mass_matrix(self, q: np.ndarray) -> np.ndarray: ...
@@ -54,23 +54,23 @@ class Twin(ABC):
 
     @abstractmethod
     def bodies(self, q: np.ndarray) -> dict[str, BodyData]:
-        """Moving bodies by our names."""
+        """Return moving bodies by our names."""
 
     @abstractmethod
     def conventions(self) -> list[tuple[str, str]]:
-        """In what the two packages write the same thing otherwise."""
+        """Return the differences between the two packages' conventions."""
 
     def lacks_rotor_forces(self) -> np.ndarray:
-        """Where (nv,) the other package leaves v ×* (J v) of rotors out of the equations of motion (docs/conventions.md)."""
+        """Return where (nv,) the other package omits v ×* (J v) of rotors from the equations of motion (docs/conventions.md)."""
         return np.zeros(len(self.armature), bool)
 
     def effects_apart(self, states: Sequence[Any]) -> list[Apart]:  # noqa: ARG002 - subclasses need it
-        """In what the effects of the two models' files differ; `states` are those that are looked at."""
+        """Return the differences between the effects of the two models' files; `states` are the compared states."""
         return []
 
 
 def _order(ours: list[str], theirs: list[str]) -> list[tuple[str, str]]:
-    """Where two orders of the same joints part."""
+    """Return the first difference between two orders of the same joints."""
     if ours == theirs:
         return []
     k = next(k for k, (a, b) in enumerate(zip(ours, theirs, strict=False)) if a != b)
@@ -166,7 +166,7 @@ class PinocchioTwin(Twin):
         return T.T @ (upper + np.triu(upper, 1).T) @ T
 
     def _velocity_product(self, q, v):
-        """Ṫv: 0, but for planar joints, whose velocity turns with them."""
+        """Return Ṫv: 0, except for planar joints, with velocities that turn with them."""
         return self._map.velocity_rate(q, v) @ v
 
     def inverse_dynamics(self, q, v, vdot):
@@ -211,7 +211,7 @@ class PinocchioTwin(Twin):
 
 
 class MuJoCoTwin(Twin):
-    """A `mujoco.MjModel`: its rigid-body dynamics; springs, dampers and the like are compared by their numbers."""
+    """A `mujoco.MjModel`: its rigid-body dynamics; springs, dampers and the like are compared by their parameters."""
 
     def __init__(self, model: Any, other: Any):
         import mujoco
@@ -263,7 +263,7 @@ class MuJoCoTwin(Twin):
         return out
 
     def _drift(self, q, v):
-        """Ṫv in MuJoCo's order: the linear acceleration of a free joint is that of its origin."""
+        """Return Ṫv in MuJoCo's order: the linear acceleration of a free joint belongs to its origin."""
         out = np.empty(self.model.nv)
         out[self._v] = mujoco_convention.acceleration_to_mujoco(self.model, q, v, np.zeros(self.model.nv))
         return out
@@ -318,7 +318,7 @@ class MuJoCoTwin(Twin):
         return effects_apart(self.model, theirs, any(self._one_sided_act(state) for state in states))
 
     def _one_sided_act(self, state):
-        """Whether a contact or a stop at a limit pushes at a state."""
+        """Check that a contact or a stop at a limit acts at a state."""
         import mujoco
 
         qpos, qvel = mujoco_convention.to_mujoco(self.model, state.q, state.v)
@@ -331,7 +331,7 @@ class MuJoCoTwin(Twin):
 
 
 def _together(pose: np.ndarray, parts: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]]) -> BodyData:
-    """Bodies (mass, centre and principal axes in the world, principal inertias) as one, in the frame at `pose`."""
+    """Return bodies (mass, centre and principal axes in the world, principal inertias) as one, in the frame at `pose`."""
     mass = float(sum(m for m, *_ in parts))
     centre = sum((m * c for m, c, *_ in parts), np.zeros(3)) / mass if mass > 0 else pose[:3, 3]
     inertia = np.zeros((3, 3))

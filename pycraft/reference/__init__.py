@@ -1,6 +1,6 @@
 """The oracle: every operator of the algebra as a dense NumPy matrix, textbook-literal and slow.
 
-Each operator is the formula that its docstring states: matrices are formed, inverses are inverses, recursions are loops
+Each operator is the formula in its docstring: matrices are formed, inverses are inverses, recursions are loops
 over bodies. The modules `reference` and `reference_...` import NumPy and SciPy only, and nothing of the rest of the
 package, so agreement with them is evidence. Notation and results follow A. Jain, *Robot and Multibody Dynamics*,
 Springer 2011; `*` is the transpose.
@@ -20,18 +20,18 @@ A model is a plain dictionary, the *description*; lists may stand for arrays::
                                           "axis": (3,), "point": (3,), "pitch": metres per radian}, ...]}}, ...],
      "nodes": [{"name": str, "body": int, "rotation": (3, 3), "position": (3,)}, ...]}
 
-Numbers. All functions compute in the numbers that the coordinates are of: float64; complex, so that a complex step
+Numbers. All functions compute in the number type of the coordinates: float64; complex, so that a complex step
 differentiates them to rounding; or, in arrays of dtype object, mpmath numbers of any number of digits::
 
     with mpmath.workdps(60):
         vdot = reference.forward_dynamics(description, q * mpmath.mpf(1), v, tau)  # (nv,), dtype object, 60 digits
 
-Velocities, forces and the description may stay doubles, which are then taken as exact. Only what a double cannot be, a unit axis or
-an orthogonal rotation, is made so to the present digits: an axis is divided by its length, a rotation is that of its quaternion.
-Raw blocks (`sko_operators`) are given as arrays of mpmath numbers.
+Velocities, forces and the description may stay doubles, which are then exact. Only values that a double cannot represent, a unit axis or an
+orthogonal rotation, are computed to the present digits: an axis is divided by its length, a rotation comes from its quaternion. Raw blocks
+(`sko_operators`) are given as arrays of mpmath numbers.
 
-Forms. The articulated-body inertia is carried from tip to base in one of the `FORMS` of `articulated_inertia`, which agree but for
-rounding; `form=` chooses it wherever it matters.
+Forms. The articulated-body inertia is carried from tip to base in one of the `FORMS` of `articulated_inertia`, which agree except for
+rounding; `form=` selects it wherever it matters.
 """
 
 from functools import cached_property
@@ -64,7 +64,7 @@ from .tree_operators import SINGULAR, Operators, block_diagonal, sko_operators, 
 
 
 class RigidOperators(Operators):
-    """`Operators` of rigid bodies, with what mechanics adds: see `operators`."""
+    """`Operators` of rigid bodies, with the operators of mechanics: see `operators`."""
 
     def __init__(self, description, q, v=None, form="fast"):
         description = in_the_numbers_of(q, description)
@@ -90,7 +90,7 @@ class RigidOperators(Operators):
         return np.eye(4) if k < 0 else self.world_pose(self.parents[k]) @ self.X[k]
 
     def node(self, name):
-        """(body, pose in the body) of the named node, or of the body of that name; ValueError where there is neither."""
+        """Return (body, pose in the body) of the named node, or of the body of that name; ValueError for an unknown name."""
         bodies = {body["name"]: (k, np.eye(4)) for k, body in enumerate(self.description["bodies"])}
         nodes = {node["name"]: (node["body"], pose(node["rotation"], node["position"])) for node in self.description["nodes"]}
         if name not in bodies | nodes:
@@ -112,7 +112,7 @@ class RigidOperators(Operators):
     def Lambda(self, names):
         """Λ: operational-space inertia of the named nodes, V(nodes) → F(nodes), (6m, 6m): (B*ΩB)⁻¹.
 
-        Raises ArithmeticError where 𝒥 lacks full row rank: the nodes then have motions that no hinge can give them.
+        Raises ArithmeticError if 𝒥 lacks full row rank: the nodes then have motions that no hinge can produce.
         """
         J = self.Jacobian(names)
         if min(J.shape) < len(J) or (J.size and np.linalg.matrix_rank(in_doubles(J)) < len(J)):
@@ -172,19 +172,18 @@ class RigidOperators(Operators):
 
 
 def operators(description, q, v=None, form="fast"):
-    """Every operator of a rigid multibody model at one state.
+    """Return every operator of a rigid multibody model at one state.
 
     Parameters
     ----------
     description : dict as in the module's docstring
-    q, v : generalized coordinates (nq,) and velocities (nv,), zero where None
+    q, v : generalized coordinates (nq,) and velocities (nv,), zero if None
     form : of the articulated-body inertia, one of `FORMS`
 
     Returns
     -------
-    RigidOperators : what `sko_operators` returns and, all in body-frame components, the attributes Delta_theta_dot V_tilde
-        V_bar momentum_cross H_dot V a b b_J hinge_cross a_gravity, and the methods B(names) Jacobian(names) Lambda(names) Delta(i)
-        world_pose(k).
+    RigidOperators : as from `sko_operators` and, all in body-frame components, the attributes Delta_theta_dot V_tilde V_bar momentum_cross
+        H_dot V a b b_J hinge_cross a_gravity, and the methods B(names) Jacobian(names) Lambda(names) Delta(i) world_pose(k).
         Raises ValueError for arrays of wrong length and, naming body and hinge, for a quaternion without direction.
 
     Examples
@@ -206,7 +205,7 @@ def operators(description, q, v=None, form="fast"):
 def inverse_dynamics_vectors(description, q, v, vdot):
     """alpha = φ*(H*θ̈ + a), f = φ(Mα + b), both (6n,), and T = Hf + Jθ̈ + b_J, (nv,), as a namespace.
 
-    With gravity α is the body-frame derivative of V less the field of gravity, and f the true interbody forces.
+    With gravity α is the body-frame derivative of V minus the field of gravity, and f the true interbody forces.
     """
     o = operators(description, q, v)
     alpha = o.phi.T @ (o.H.T @ vdot + o.a)
@@ -231,7 +230,7 @@ def forward_dynamics_vectors(description, q, v, tau, form="fast"):
 
 
 def inverse_dynamics(description, q, v, vdot):
-    """T, (nv,): (ℳ + J)θ̈ + 𝒞, the generalized forces that give the accelerations vdot against gravity."""
+    """T, (nv,): (ℳ + J)θ̈ + 𝒞, the generalized forces that produce the accelerations vdot against gravity."""
     return inverse_dynamics_vectors(description, q, v, vdot).T
 
 

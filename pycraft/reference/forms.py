@@ -13,8 +13,8 @@ FORMS = ("fast", "joseph", "ud", "square-root")
 def unit_factors(A):
     """U, w: A = U diag(w) U* with as many columns and weights w > 0 as A, symmetric and positive semidefinite, has rank.
 
-    LDL*, the next pivot the one that elimination left most of, as long as that is more than n eps of it. ArithmeticError where
-    a diagonal term turns negative instead: A is indefinite.
+    LDL*, with the largest remaining pivot next, as long as it exceeds n eps of its original value. ArithmeticError if a diagonal term turns
+    negative instead: A is indefinite.
     """
     whole, columns, w = np.where(np.diag(A) > 0, np.diag(A), 1), [np.zeros((len(A), 0), A.dtype)], []
     while (left := np.diag(A) / whole).max(initial=0) > len(A) * epsilon(A):
@@ -23,12 +23,12 @@ def unit_factors(A):
         w.append(A[i, i])
         A = A - w[-1] * columns[-1] @ columns[-1].T
     if left.min(initial=0) < -len(A) * epsilon(A):
-        raise ArithmeticError("an inertia is indefinite: only the forms 'fast' and 'joseph' take it")
+        raise ArithmeticError("an inertia is indefinite: only the forms 'fast' and 'joseph' accept it")
     return np.hstack(columns), np.array(w, A.dtype)
 
 
 def gram_schmidt(rows, w):
-    """U, d: U unit lower triangular, rows diag(w) rows* = U diag(d) U*; each row in turn leaves the later ones, weighted by w."""
+    """U, d: U unit lower triangular, rows diag(w) rows* = U diag(d) U*; each row in turn is removed from the later ones, weighted by w."""
     rows, U, d = rows.copy(), np.eye(len(rows)).astype(rows.dtype), np.zeros(len(rows), rows.dtype)
     for r in range(len(rows)):
         d[r] = rows[r] * w @ rows[r]
@@ -67,14 +67,14 @@ def articulated_inertia(o, form="fast"):
 
     Parameters
     ----------
-    form : what is carried from body to body
+    form : the quantity carried from body to body
         fast: P⁺ = P − GDG*.
-        joseph: P⁺ = τ̄Pτ̄* + GJG*, τ̄ = I − GH: a sum of squares, no more accurate for it; an exhibit.
+        joseph: P⁺ = τ̄Pτ̄* + GJG*, τ̄ = I − GH: a sum of squares, but not more accurate; for demonstration.
         ud: U⁺ and w⁺ of P⁺ = U⁺ diag(w⁺) U⁺*. No difference of inertias is taken: see `factors_across_hinge`.
         square-root: the same of P⁺ = LL*, w = 1.
 
-    Raises ArithmeticError, naming body and hinge, where no D⁻¹(k) exists (see `SINGULAR`), and where an inertia is indefinite and
-    the form needs its factors.
+    Raises ArithmeticError, naming body and hinge, if no D⁻¹(k) exists (see `SINGULAR`), and if an inertia is indefinite and the form needs
+    its factors.
     """
     if form not in FORMS:
         raise ValueError(f"form={form!r}: there are {', '.join(FORMS)}")

@@ -1,33 +1,33 @@
-"""The numbers that the oracle computes in: NumPy's own, or mpmath's of any number of digits. See `pycraft.reference`."""
+"""The numbers of the oracle: NumPy's own, or mpmath's of any number of digits. See `pycraft.reference`."""
 
 import numpy as np
 from scipy.linalg import expm
 
 
 def mpmath_context(*arrays):
-    """The mpmath context (its functions and precision) of the numbers in the arrays; None where they hold NumPy's own numbers."""
+    """Return the mpmath context (its functions and precision) of the numbers in the arrays; None if they hold NumPy's own numbers."""
     objects = (x for array in arrays if array.dtype == object for x in array.flat)
     return next((x.context for x in objects if hasattr(x, "context")), None)
 
 
 def converted(x, context):
-    """The array x in numbers of an mpmath context, exactly; x itself where that is None."""
+    """Return the array x in numbers of an mpmath context, exactly; x itself if the context is None."""
     return x if context is None else np.vectorize(context.convert, otypes=[object])(x)
 
 
 def in_doubles(x):
-    """The array x rounded to doubles where it holds mpmath numbers."""
+    """Return the array x rounded to doubles if it holds mpmath numbers."""
     return x.astype(float) if x.dtype == object else x
 
 
 def epsilon(x):
-    """The distance from one to the next number of the kind in the array x."""
+    """Return the distance from one to the next number of the kind in the array x."""
     context = mpmath_context(x)
     return np.finfo(float).eps if context is None else context.eps
 
 
 def inv(A):
-    """A⁻¹; that of mpmath numbers by Gauss–Jordan elimination, the largest entry of a column its pivot. ArithmeticError if singular."""
+    """A⁻¹; for mpmath numbers by Gauss–Jordan elimination, the largest entry of a column as pivot. ArithmeticError if singular."""
     if mpmath_context(A) is None:
         return np.linalg.inv(in_doubles(A))
     n, A = len(A), np.hstack([A, np.eye(len(A))])
@@ -43,7 +43,7 @@ def inv(A):
 
 
 def smallest_singular_value(A):
-    """σ_min of the square matrix A; of mpmath numbers 1/‖A⁻¹‖_F, which is below it by a factor √n at most."""
+    """σ_min of the square matrix A; for mpmath numbers 1/‖A⁻¹‖_F, which is smaller by a factor √n at most."""
     if mpmath_context(A) is None:
         return np.linalg.svd(in_doubles(A), compute_uv=False).min()
     try:

@@ -29,7 +29,7 @@ def crf(V):
 
 
 def pose(rotation, position):
-    """X, (4, 4): the frame with the given orientation and origin; X maps its coordinates to those of the reference."""
+    """X, (4, 4): the frame with the given orientation and origin; X maps its coordinates to coordinates of the reference."""
     return np.block([[np.asarray(rotation), np.reshape(position, (3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
 
 
@@ -40,9 +40,9 @@ def force_transform(X):
 
 
 def rotation_from_quaternion(q):
-    """R(q), (3, 3): (w² − u·u)I + 2uu* + 2wũ of q/|q| = (w, u). Raises ValueError where |q| < 1e-8 or is not finite."""
+    """R(q), (3, 3): (w² − u·u)I + 2uu* + 2wũ of q/|q| = (w, u). Raises ValueError if |q| < 1e-8 or is not finite."""
     norm = np.dot(q, q) ** 0.5
-    if not 1e-8 <= abs(norm) < np.inf:  # false for NaN, too
+    if not 1e-8 <= abs(norm) < np.inf:  # false for NaN as well
         raise ValueError(f"the quaternion {np.array2string(np.asarray(q))} has no direction")
     w, u = q[0] / norm, q[1:] / norm
     return (w * w - u @ u) * np.eye(3) + 2 * np.outer(u, u) + 2 * w * skew(u)
@@ -115,7 +115,7 @@ def hinge_kinematics(body, q):
 
 
 def split(x, sizes):
-    """The array x cut into consecutive pieces of the given sizes; ValueError unless they add up to its length."""
+    """Return the array x cut into consecutive pieces of the given sizes; ValueError unless they add up to its length."""
     x, ends = np.asarray(x), np.cumsum(np.array(sizes, int))
     if x.shape != (sum(sizes),):
         raise ValueError(f"expected an array of shape ({sum(sizes)},), got {x.shape}")
@@ -123,12 +123,12 @@ def split(x, sizes):
 
 
 def hinge_sizes(description, table):
-    """Number of coordinates of each body's hinge: table is Q_SIZE (sums to nq) or V_SIZE (sums to nv)."""
+    """Return the number of coordinates of each body's hinge: table is Q_SIZE (sums to nq) or V_SIZE (sums to nv)."""
     return [sum(table[s["kind"]] for s in body["hinge"]["subhinges"]) for body in description["bodies"]]
 
 
 def in_the_numbers_of(q, description):
-    """The description in the numbers of q: doubles are exact, but for unit axes and orthogonal rotations, made so to the digits."""
+    """Return the description in the numbers of q: doubles are exact, except unit axes and orthogonal rotations, computed to the digits."""
     context = mpmath_context(np.asarray(q))
     if context is None:
         return description

@@ -7,10 +7,10 @@ import numpy as np
 from .forms import articulated_inertia
 from .numbers import converted, epsilon, inv, mpmath_context, smallest_singular_value
 
-# D(k) counts as singular where its smallest singular value, in units in which |H||R||H*| + |J| (D with all outboard hinges
-# locked and no cancellation) has a diagonal of ones, is at most SINGULAR eps. What rounding leaves of an exact zero is below 2 eps
-# there on random chains; a chain of ten links with a tip 1e13 times heavier still has 50 eps, a legitimate D. The forms that carry
-# factors have a root of D, and hold its singular values against the same limit: theirs of D is (SINGULAR eps)².
+# D(k) counts as singular if its smallest singular value, in units in which |H||R||H*| + |J| (D with all outboard hinges locked and no
+# cancellation) has a diagonal of ones, is at most SINGULAR eps. Rounding of an exact zero is below 2 eps there on random chains; a chain of
+# ten links with a tip 1e13 times heavier still has 50 eps, a legitimate D. The forms that carry factors have a root of D, and compare its
+# singular values with the same limit: their limit for D is (SINGULAR eps)².
 SINGULAR = 16
 
 
@@ -24,7 +24,7 @@ def block_diagonal(blocks):
 
 
 def symbol(formula, meaning):
-    """An attribute computed from the others by its formula when first read, with its meaning as docstring."""
+    """Return an attribute computed from the others by its formula on first use, with its meaning as docstring."""
     attribute = cached_property(formula)
     attribute.__doc__ = meaning
     return attribute
@@ -38,7 +38,7 @@ class Operators:
     """
 
     def __init__(self, parents, E_blocks, H_blocks, M_blocks, J_blocks=None, names=None, form="fast"):
-        H_blocks = [np.reshape(h, (len(h), len(m))) for h, m in zip(H_blocks, M_blocks, strict=True)]  # [] is a block too
+        H_blocks = [np.reshape(h, (len(h), len(m))) for h, m in zip(H_blocks, M_blocks, strict=True)]  # [] is also a block
         if any(not -1 <= p < k for k, p in enumerate(parents)):
             raise ValueError(f"parents come before their children, -1 is the base: got {list(parents)}")
         self.parents, self.form, bodies = list(parents), form, range(len(parents))
@@ -71,13 +71,13 @@ class Operators:
         return R
 
     def require_regular(self, k, D=None, root=None):
-        """Raise ArithmeticError, naming body k and its hinge, where D = D(k) = root root* is singular to rounding (see `SINGULAR`)."""
+        """Raise ArithmeticError, naming body k and its hinge, if D = D(k) = root root* is singular to rounding (see `SINGULAR`)."""
         s, t = self.states[k], self.coordinates[k]
         locked = np.diag(abs(self.H[t, s]) @ abs(self.R[s, s]) @ abs(self.H[t, s]).T + abs(self.J[t, t])) ** 0.5
         scale = np.where(locked == 0, 1, locked)
         scaled = D / np.outer(scale, scale) if root is None else root / scale[:, None]
         if scaled.size and smallest_singular_value(scaled) <= SINGULAR * epsilon(scaled):
-            raise ArithmeticError(f"D is singular at {self.names[k]}: some motion of its hinge meets no inertia")
+            raise ArithmeticError(f"D is singular at {self.names[k]}: some motion of its hinge feels no inertia")
 
     @cached_property
     def Upsilon(self):
@@ -113,25 +113,25 @@ class Operators:
 
 
 def sko_operators(parents, E_blocks, H_blocks, M_blocks, J_blocks=None, form="fast"):
-    """The algebra of a tree given by raw blocks: s_k states and n_k hinge coordinates at body k, zero included.
+    """Return the algebra of a tree given by raw blocks: s_k states and n_k hinge coordinates at body k, zero included.
 
     Parameters
     ----------
     parents : index of each body's parent, −1 for roots; parents come before children
     E_blocks : E_φ(p,k), (s_p, s_k) each; None for roots
     H_blocks, M_blocks : H(k), (n_k, s_k), and M(k), (s_k, s_k), symmetric
-    J_blocks : hinge-diagonal terms J(k), (n_k, n_k), symmetric; zero where None
+    J_blocks : hinge-diagonal terms J(k), (n_k, n_k), symmetric; zero if None
     form : of the articulated-body inertia, one of `FORMS`
 
     Returns
     -------
     Operators : E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega I innovations mass_matrix
-        (HφMφ*H*, without J) mass_matrix_inverse (of ℳ + J), each computed when first read. Those that need P raise
-        ArithmeticError where a D(k) is singular.
+        (HφMφ*H*, without J) mass_matrix_inverse (of ℳ + J), each computed on first use. Those that need P raise ArithmeticError if a D(k)
+        is singular.
 
     Examples
     --------
-    Two unit masses on a line, each on a slider: the articulated mass at the inner one is its own alone.
+    Two unit masses on a line, each on a slider: the articulated mass at the inner one is its own mass.
 
     >>> line = sko_operators([-1, 0], [None, [[1.0]]], [[[1.0]], [[1.0]]], [[[1.0]], [[1.0]]])
     >>> line.P.tolist(), line.mass_matrix.tolist()

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import _core
 from ..dynamics.integrator_names import takes_one_size
-from ..dynamics.stiff_motion import TAKE, TAKE_DOUBLE, stiffness_text
+from ..dynamics.stiff_motion import SHORTER, TAKE, TAKE_DOUBLE, stiffness_text
 from ..models.warning import warn
 from .motion import Motion
 
@@ -38,8 +38,8 @@ def _looked_at(rows: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def _energy_lost(run: Any, rows: Mapping[str, np.ndarray]) -> str:
-    """Of steps of one size, which no error estimate shortens, where works are kept account of."""
-    if not run._about["energy"]:
+    """Of steps of one size, which no error estimate shortens, where works are kept account of; said already of those found unstable."""
+    if not run._about["energy"] or "stiffness" in run.statistics:
         return ""
     looked = _looked_at(rows)
     some = Motion(run._about, {name: rows[name][looked] for name in ("t", "q", "v", "states", "work")}, run._calls)
@@ -80,11 +80,13 @@ def _below_atol(run: Any, rows: Mapping[str, np.ndarray]) -> str:
 
 
 def warn_of_stiffness(scene: Any, integrator: str, found: Mapping[str, Any]) -> None:
-    """Warn, once for each scene, that the motion is stiff, of what, and which integrator to take."""
+    """Warn, once for each scene, that the motion is stiff or its steps are unstable, of what, and which integrator or step to take."""
     if scene._stiffness_said:
         return
     scene._stiffness_said = True
     remedy = TAKE if scene._how[3] == "double" else TAKE_DOUBLE
-    if scene._keeps_loops():
+    if found["longest"]:
+        remedy = SHORTER + (", or ImplicitSpring and ImplicitDamping" if integrator == "semi-implicit-euler" else "")
+    elif scene._keeps_loops():
         remedy = "Take integrator='rosenbrock4' with the loops held by springs (Loop(method='penalty')), or a softer law"
     warn(stiffness_text(f"the scene of {scene.model.name!r}", integrator, found, remedy))

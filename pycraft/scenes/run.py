@@ -68,7 +68,7 @@ class Run(Motion, Renamed):
         rows = steps if keep is None else {name: x[keep] for name, x in record.samples.items()}
         about = {
             "model": scene.model, "effects": names, "workers": list(calls.workers), "energy": options.energy, "integrator": integrator,
-            "options": options.told, "precision": precision, "stops": scene._stops(),
+            "options": options.told, "precision": precision, "stops": scene._stops(), "held": _core.held_states(calls),
         }  # fmt: skip
         kinds = [*record.own_events, *(event.name for event in events)]
         of, states = record.events
@@ -108,8 +108,8 @@ class Run(Motion, Renamed):
 
         By the dense output of the integrator where it has one of its own ("dopri5", order 4; "dop853", 7; "rosenbrock4", 3), else by
         Hermite's interpolation in q, v, v̇ on the group between the ends of steps: errors of a step of size h are O(h⁶) in q, O(h⁵) in v
-        and O(h⁴) in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, and
-        straight lines for works and states.
+        and O(h⁴) in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, with
+        the accelerations of each step at its ends, also at knots and samples, and straight lines for works and states.
 
         Parameters
         ----------
@@ -163,19 +163,23 @@ class Run(Motion, Renamed):
         return {name: np.concatenate([part[name] for _, part in parts])[back] for name in parts[0][1]}
 
     def _interpolated(self, rows: Mapping[str, np.ndarray], times: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
-        t, vdot = rows["t"], self._vdot_of_steps
-        q, v = _core.hermite_between(self.model, t, rows["q"], rows["v"], vdot, times.tolist(), steps.tolist())
+        t, (after, before) = rows["t"], self._vdot_of_steps
+        q, v = _core.hermite_between(self.model, t, rows["q"], rows["v"], after, before, times.tolist(), steps.tolist())
         share = ((times - t[steps]) / (t[steps + 1] - t[steps]))[:, None]
         lines = {name: (1 - share) * rows[name][steps] + share * rows[name][steps + 1] for name in ("states", "work")}
+        if held := self._about.get("held"):
+            lines["states"][:, held] = rows["states"][steps + 1][:, held]
         return {"t": times, "q": q, "v": v, **lines}
 
     @cached_property
-    def _vdot_of_steps(self) -> np.ndarray:
+    def _vdot_of_steps(self) -> tuple[np.ndarray, np.ndarray]:
+        """(K, nv) twice: with which the step begins that starts at a row, and with which the one ends that led there. They differ at knots
+        of functions of time and where controllers are sampled."""
         rows = self._steps
-        if rows is None or rows["t"] is self.t:
-            return self.vdot
+        if rows is None or self._calls is None:
+            return self.vdot, self.vdot
         self._unedited_model()
-        return self._calls.along(*(rows[name] for name in ("t", "q", "v", "states")))["vdot"]
+        return _core.step_accelerations(self._calls, *(rows[name] for name in ("t", "q", "v", "states")))
 
     def checkpoint(self) -> Checkpoint:
         """From where the run can go on: `scene.resume(run.checkpoint(), T)`."""

@@ -17,10 +17,14 @@ from .coordinate_units import coordinate_units
 from .events import EventStates
 from .run_tables import HOLDS, columns_of, variables_of
 
-FORMAT = "pycraft run 1"
+FORMAT = "pycraft run 2"
+FORMATS = ("pycraft run 1", FORMAT)
+"""Those that are read. Files of the first do not say with which accelerations steps end, nor what controllers hold."""
 ABOUT = ("effects", "workers", "energy", "integrator", "options", "precision")
 """What a run says of itself beside its model."""
 ENDINGS = (".nc", ".parquet", ".csv")
+BETWEEN = ("vdot_after", "vdot_before")
+"""Columns of a Parquet file, where they differ from the accelerations at its rows: with which steps begin there, and end."""
 
 
 def checked_output(path: Any) -> Path:
@@ -90,8 +94,9 @@ def _run(
     from .run import Run
 
     told = json.loads(text)
-    if told.get("format") != FORMAT:
-        raise _core.EvaluationError(f"{str(path)!r} holds no run of this version: its format is {told.get('format')!r}, not {FORMAT!r}")
+    if told.get("format") not in FORMATS:
+        known = " or ".join(repr(each) for each in FORMATS)
+        raise _core.EvaluationError(f"{str(path)!r} holds no run of this version: its format is {told.get('format')!r}, not {known}")
     if missing := [name for name in ABOUT if name not in told["about"]]:
         raise ValueError(f"it does not say: {', '.join(missing)}")
     about = told["about"] | {"model": Multibody.from_description(told["model"])}
@@ -127,7 +132,9 @@ def _to_netcdf(run: Any, path: Path) -> None:
     if steps is not None and steps["t"] is not run.t:
         axes_of = {"t": (), "q": ("configuration",), "v": ("coordinate",), "states": ("state",), "work": ("worker",)}
         variables |= {f"step_{name}": (("step", *axes_of[name]), steps[name], "") for name in axes_of}
-        variables["step_vdot"] = (("step", "coordinate"), run._vdot_of_steps, "")
+        variables |= _accelerations(run, "step")
+    elif steps is not None and any(not np.array_equal(each, run.vdot) for each in run._vdot_of_steps):
+        variables |= _accelerations(run, "time")
     with netcdf_file(str(path), "w", version=2) as file:
         file.about = _about(run).encode("utf-8")
         sizes: dict[str, int] = {}
@@ -153,12 +160,20 @@ def _from_netcdf(path: Path) -> Any:
     n, empty = len(found["time"]), np.zeros((len(found["time"]), 0))
     rows = {"t": found["time"], **{name: found.get(name, empty) for name in ("q", "v", "states", "work")}}
     along = {name: found.get(name, empty) for name in ("vdot", "forces", "potential")} | {"kinetic": found.get("kinetic", np.zeros(n))}
-    if "step_t" not in found:
-        return _run(about, path, rows, None, along)
-    empty = np.zeros((len(found["step_t"]), 0))
-    run = _run(about, path, rows, {name: found.get(f"step_{name}", empty) for name in ("t", "q", "v", "states", "work")}, along)
-    run.__dict__["_vdot_of_steps"] = found.get("step_vdot", empty)
+    steps = None
+    if "step_t" in found:
+        empty = np.zeros((len(found["step_t"]), 0))
+        steps = {name: found.get(f"step_{name}", empty) for name in ("t", "q", "v", "states", "work")}
+    run = _run(about, path, rows, steps, along)
+    if steps is not None or "step_vdot" in found:
+        after = found.get("step_vdot", empty)
+        run.__dict__["_vdot_of_steps"] = after, found.get("step_vdot_before", after)
     return run
+
+
+def _accelerations(run: Any, axis: str) -> dict[str, tuple[tuple[str, ...], np.ndarray, str]]:
+    """With which steps begin and end."""
+    return dict(zip(("step_vdot", "step_vdot_before"), (((axis, "coordinate"), x, "") for x in run._vdot_of_steps), strict=True))
 
 
 # ---------------------------------------------------------------------- tables
@@ -175,7 +190,12 @@ def _pyarrow() -> Any:
 
 def _to_parquet(run: Any, path: Path) -> None:
     pyarrow = _pyarrow()
-    table = pyarrow.table({name: np.ascontiguousarray(x) for name, x in columns_of(run).items()})
+    columns = columns_of(run)
+    if run._steps is not None and run._steps["t"] is run.t:
+        for start, x in zip(BETWEEN, run._vdot_of_steps, strict=True):
+            if not np.array_equal(x, run.vdot):
+                columns |= {f"{start}.{name}": x[:, i] for i, name in enumerate(run.model.coordinate_names)}
+    table = pyarrow.table({name: np.ascontiguousarray(x) for name, x in columns.items()})
     pyarrow.parquet.write_table(table.replace_schema_metadata({"pycraft": _about(run)}), str(path))
 
 
@@ -197,7 +217,9 @@ def _from_parquet(path: Path) -> Any:
     rows = {"t": columns["t"], "q": those("q", of_q), "v": those("v", of_v), "states": states, "work": those("work", effects)}
     forces = np.stack([those(f"force.{effect}", of_v) for effect in effects]) if effects else np.zeros((0, n, len(of_v)))
     along = {"vdot": those("vdot", of_v), "forces": forces, "kinetic": columns["kinetic"], "potential": those("potential", effects)}
-    return _run(about, path, rows, None, along)
+    run = _run(about, path, rows, None, along)
+    run.__dict__["_vdot_of_steps"] = tuple(x if x.shape[1] else along["vdot"] for x in (those(start, of_v) for start in BETWEEN))
+    return run
 
 
 def _to_csv(run: Any, path: Path) -> None:

@@ -1,7 +1,7 @@
-"""A four-bar's equations of motion as one writes them for it alone: derived by SymPy, printed as C++, built as compiled calls are.
+"""Equations of motion derived for a four-bar alone: by SymPy, printed as C++, built like compiled calls.
 
-The angles of the three bars from +x are all that Lagrange's equations know here: of energies in closed form, with the two equations that
-close the loop, solved by elimination. What it costs is what a program for any mechanism is to be held against.
+The only unknowns are the angles of the three bars from +x in Lagrange's equations: energies in closed form, with the two equations that
+close the loop, solved by elimination. Programs for general mechanisms are measured against its cost.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from ..compiled.source import FUNCTION
 
 
 def equations(gravity: float = 9.81) -> tuple[list[tuple[Any, Any]], list[Any]]:
-    """The assignments, in order, and q̈ of the coordinates of `n_four_bar(1)` in terms of them: q, v and tau are `q0`, `v0`, `tau0`, ...
+    """Return the assignments, in order, and q̈ of the coordinates of `n_four_bar(1)` in terms of them: q, v and tau are `q0`, `v0`, `tau0`,
+    ...
 
     Bars of 1 m and 1 kg with their centres in their middles; gravity in m/s² along -y.
     """
     time = sympy.Symbol("t")
-    angles = [sympy.Function(f"a{i}")(time) for i in range(3)]  # absolute: of the crank, the coupler, the other crank
+    angles = [sympy.Function(f"a{i}")(time) for i in range(3)]  # absolute angles of the crank, the coupler, the other crank
     tips = [sympy.Matrix([sympy.cos(a), sympy.sin(a)]) for a in angles]
     ground = sympy.Matrix([1, 0])
     centres = [tips[0] / 2, tips[0] + tips[1] / 2, ground + tips[2] / 2]
@@ -31,7 +32,7 @@ def equations(gravity: float = 9.81) -> tuple[list[tuple[Any, Any]], list[Any]]:
     kinetic = sum((c.diff(time).dot(c.diff(time)) / 2 + w**2 / 24 for c, w in zip(centres, turns, strict=True)), sympy.S.Zero)
     potential = sum((gravity * c[1] for c in centres), sympy.S.Zero)
     closure = tips[0] + tips[1] - ground - tips[2]
-    # What Lagrange's equations leave of angles: of sines and cosines of the inputs alone, each taken once.
+    # The remaining functions of angles in Lagrange's equations: sines and cosines of the inputs, each computed once.
     sines, cosines = sympy.symbols("s0:3"), sympy.symbols("c0:3")
     speeds = sympy.symbols("w0:3")
     plain = {
@@ -59,7 +60,7 @@ def equations(gravity: float = 9.81) -> tuple[list[tuple[Any, Any]], list[Any]]:
         held += [(sines[i], sympy.sin(angle)), (cosines[i], sympy.cos(angle))]
 
     def named(matrix: Any, letter: str) -> Any:
-        """Symbols for its entries that are no constants."""
+        """Return symbols for the entries that are not constants."""
         out = matrix.copy()
         for i in range(matrix.rows):
             for j in range(matrix.cols):
@@ -71,7 +72,7 @@ def equations(gravity: float = 9.81) -> tuple[list[tuple[Any, Any]], list[Any]]:
         return out
 
     mass, rows, force, curving = named(mass, "m"), named(rows, "r"), named(force, "f"), named(curving, "k")
-    # q̈ = M⁻¹ (f + R* λ), R q̈ + k = 0: M is a block of 2 and one of 1, R M⁻¹ R* a matrix of 2.
+    # q̈ = M⁻¹ (f + R* λ), R q̈ + k = 0: M has a 2 × 2 block and a 1 × 1 block, R M⁻¹ R* is 2 × 2.
     inverse = named(mass.inv(method="ADJ").applyfunc(sympy.together), "i")
     moved, free = named(inverse * rows.T, "b"), named(inverse * force, "u")
     compliance, off = named(rows * moved, "s_"), named(rows * free + curving, "e")
@@ -81,12 +82,12 @@ def equations(gravity: float = 9.81) -> tuple[list[tuple[Any, Any]], list[Any]]:
 
 
 def source(gravity: float = 9.81) -> str:
-    """The C++ of them: the function that a compiled call has, of one state (pycraft/compiled/runtime/loop.h)."""
+    """Return their C++: a function in the form of a compiled call, for one state (pycraft/compiled/runtime/loop.h)."""
     held, results = equations(gravity)
     names = [symbol for symbol, _ in held]
     common, reduced = sympy.cse([value for _, value in held] + results, symbols=sympy.numbered_symbols("x"), optimizations="basic")
     code = cxx_code_printers["c++17"]().doprint
-    # A common part goes where all that it is made of is known.
+    # A common subexpression is placed as soon as all its parts are known.
     lines, known, waiting = list[str](), set(names) - set(names), list(common)
 
     def put_common() -> None:
@@ -112,7 +113,7 @@ def source(gravity: float = 9.81) -> str:
 
 
 def accelerations(place: str, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """q̈ (B, 3) by the library there, at states (B, 3)."""
+    """Return q̈ (B, 3) from this library, at states (B, 3)."""
     function = getattr(ctypes.CDLL(place), FUNCTION)
     pointer = ctypes.POINTER(ctypes.c_double)
     function.argtypes = (ctypes.POINTER(pointer), ctypes.c_void_p, pointer, ctypes.c_int64)
@@ -123,5 +124,5 @@ def accelerations(place: str, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> 
 
 
 def library(gravity: float = 9.81) -> str:
-    """The path of the library that is built of it."""
+    """Return the path of the library built from the source."""
     return str(built(source(gravity)))

@@ -1,8 +1,8 @@
 r"""The bridge to SymPy: operator expressions as SymPy matrix expressions and back, and expressions from text or LaTeX.
 
-`to_sympy` changes nothing: what was typed is what SymPy shows, and `from_sympy` gives the same expression back. In between SymPy may
-`expand`, `doit`, `subs`, collect or print; it knows that operators do not commute, and nothing of the theorems. SymPy is imported when
-it is first asked for.
+`to_sympy` changes nothing: SymPy shows the expression as typed, and `from_sympy` returns the same expression. In between SymPy may
+`expand`, `doit`, `subs`, collect or print; it knows that operators do not commute, but none of the theorems. SymPy is imported on first
+use.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from ..proofs.nesting import within_reach
 
 @within_reach("parse")
 def parse(text: str, model: Any, **names: _core.Operator) -> Any:
-    r"""An operator (or scalar) expression from text: Python's spelling, the book's, or LaTeX.
+    r"""Return an operator (or scalar) expression from text: Python's spelling, the book's, or LaTeX.
 
     Parameters
     ----------
     text : str
         "H @ phi @ M @ phi.T @ H.T", "HφMφ*H*", r"H\phi M\phi^*H^*"; see `docs/notation.md` for the letters and functions
     model : a model or an operator set
-        Whose letters they are.
+        The owner of the letters.
     names : operators by name
-        More names that may be used: constants, vectors, expressions.
+        Additional names: constants, vectors, expressions.
 
     Raises
     ------
     ParseError
-        No reading fits, or two that differ do, or the text is an equation (`pycraft.check` takes those).
+        No reading fits, two different ones fit, or the text is an equation (`pycraft.check` takes those).
 
     Examples
     --------
@@ -49,7 +49,7 @@ def parse(text: str, model: Any, **names: _core.Operator) -> Any:
 
 @within_reach("to_sympy")
 def to_sympy(expression: Any) -> Any:
-    r"""An operator or scalar expression as a SymPy expression that prints as the book does.
+    r"""Return an operator or scalar expression as a SymPy expression that prints as in the book.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def to_sympy(expression: Any) -> Any:
     Returns
     -------
     sympy.MatrixExpr, or sympy.Expr for a scalar
-        Letters, constants and vectors are `OperatorSymbol` (SymPy's MatrixSymbol) with a symbolic dimension per space, stars `Star`
-        (its Transpose); sums, products and inverses SymPy's own, unevaluated, so nothing is combined or cancelled until SymPy is
-        asked to (`.doit()`, `.expand()`). Numbers are exact: fractions where one is the double, else Floats of 53 bits.
+        Letters, constants and vectors are `OperatorSymbol` (SymPy's MatrixSymbol) with a symbolic dimension per space, stars `Star` (its
+        Transpose); sums, products and inverses are SymPy's own, unevaluated, so nothing is combined or cancelled until SymPy is asked to
+        (`.doit()`, `.expand()`). Numbers are exact: fractions if one equals the double, else Floats of 53 bits.
 
     Notes
     -----
-    A space and its dual have one dimension there, so SymPy does not see that φφ* is meaningless; `from_sympy` does. Constants, vectors
-    and letters bound to a state are kept, for the life of the process, under a token in the symbol.
+    A space and its dual have the same dimension there, so SymPy does not see that φφ* is meaningless; `from_sympy` does. Constants, vectors
+    and letters bound to a state are stored, for the life of the process, under a token in the symbol.
 
     Examples
     --------
@@ -89,18 +89,18 @@ def to_sympy(expression: Any) -> Any:
 
 @within_reach("from_sympy")
 def from_sympy(expression: Any, model: Any, values: Mapping[Any, float] | None = None, like: _core.Operator | None = None) -> Any:
-    """The pycraft expression of a SymPy expression made of what `to_sympy` made.
+    """Return the pycraft expression of a SymPy expression built from results of `to_sympy`.
 
     Parameters
     ----------
     expression : SymPy matrix or scalar expression
     model : a model or an operator set
-        Whose letters are meant: those are found by name, so it may be another model than the one they came from. Constants and
-        vectors are those that `to_sympy` was given.
+        The owner of the letters: they are found by name, so it may be another model than the original one. Constants and vectors are those
+        given to `to_sympy`.
     values : mapping
-        Numbers of scalar symbols that were brought in.
+        Values of additional scalar symbols.
     like : Operator
-        Whose spaces a lone zero or I has.
+        Gives the spaces of a lone zero or I.
 
     Returns
     -------
@@ -109,9 +109,9 @@ def from_sympy(expression: Any, model: Any, values: Mapping[Any, float] | None =
     Raises
     ------
     EvaluationError
-        A SymPy object that is no operator expression, a symbol without a value, a zero without spaces.
+        A SymPy object that is not an operator expression, a symbol without a value, a zero without spaces.
     SpaceError
-        A product or sum whose spaces do not meet.
+        A product or sum with spaces that do not match.
     """
     from .sympy_reader import Reader
 

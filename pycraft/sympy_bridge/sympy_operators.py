@@ -1,6 +1,6 @@
-r"""Operators as SymPy matrix expressions: the classes that the bridge (`sympy_bridge`) makes.
+r"""Operators as SymPy matrix expressions: the classes of the bridge (`sympy_bridge`).
 
-A letter is an `OperatorSymbol`, a SymPy `MatrixSymbol` that prints as the book does; sums, products, inverses and powers are SymPy's own
+A letter is an `OperatorSymbol`, a SymPy `MatrixSymbol` that prints as in the book; sums, products, inverses and powers are SymPy's own
 `MatAdd`, `MatMul`, `Inverse`, `MatPow`, so `expand`, `doit`, `subs`, `.T` and the printers work on them. The star is `Star`, a
 `Transpose` printed \(A^*\). Spaces become symbolic dimensions; a space and its dual share one, so that transposes fit.
 """
@@ -19,7 +19,7 @@ from sympy.printing.pretty.stringpict import prettyForm
 
 from .. import _core
 
-# What only exists in this process: constants, vectors, letters bound to a state, by the token in the symbol's arguments.
+# Objects that exist only in this process: constants, vectors, letters bound to a state, by the token in the symbol's arguments.
 _KEPT: dict[str, _core.Operator] = {}
 _TOKEN_OF: dict[_core.Operator, str] = {}
 _TOKENS = itertools.count(1)
@@ -40,7 +40,7 @@ class OperatorSymbol(MatrixSymbol):
         return self.args[3].name
 
     def operator(self, operators: Any) -> _core.Operator:
-        """The operator of the set `operators` (or what was kept) that this symbol stands for."""
+        """Return the operator of the set `operators` (or a stored one) that this symbol stands for."""
         said = json.loads(self.token) if self.token else {"name": self.name}
         if "kept" in said:
             if self.token not in _KEPT:
@@ -66,12 +66,12 @@ class OperatorSymbol(MatrixSymbol):
 
 
 def _tuples(data: Any) -> Any:
-    """JSON's lists as the tuples that they were."""
+    """Return JSON's lists as the original tuples."""
     return tuple(map(_tuples, data)) if isinstance(data, list | tuple) else data
 
 
 def symbol_of(e: _core.Operator, name: str, rows: Any, columns: Any) -> OperatorSymbol:
-    """The symbol of a leaf: a letter that can be found again by name, or an operator that is kept."""
+    """Return the symbol of a leaf: a letter that can be found again by name, or a stored operator."""
     letter = e.letter if e.kind == "symbol" else None
     if letter is not None and letter.binding is None:
         token = json.dumps({"name": letter.name, "arguments": letter.arguments, "text": letter.text})
@@ -104,7 +104,7 @@ class OperatorSum(MatAdd):
 
 
 class OperatorProduct(MatMul):
-    """A product with at most one number in front, that prints as it was typed."""
+    """A product with at most one number in front, printed as typed."""
 
     def _latex(self, printer: Any) -> str:
         number, *matrices = self.args if not self.args[0].is_Matrix else (sympy.S.One, *self.args)
@@ -115,7 +115,7 @@ class OperatorProduct(MatMul):
 
 
 class OperatorUnit(Identity):
-    """I: of a space that is said ("F", ...), or of the one that fits."""
+    """I: of a named space ("F", ...), or of one inferred from the context."""
 
     def __new__(cls, dimension: Any, token: Any = "") -> OperatorUnit:
         return _shaped(cls, dimension, str(token))
@@ -152,7 +152,7 @@ class OperatorZero(ZeroMatrix):
 
 
 def keep(e: _core.Operator) -> str:
-    """A token by which an operator is found again in this process: the same for equal operators."""
+    """Return a token that finds an operator again in this process: the same for equal operators."""
     if e not in _TOKEN_OF:
         token = _TOKEN_OF[e] = json.dumps({"kept": next(_TOKENS)})
         _KEPT[token] = e
@@ -212,7 +212,7 @@ class Root(_Function):
 
 
 class BlockFunction(MatrixExpr):
-    """A function that derivatives bring up: crm, crf, mcross of a vector, the lower half of a block-diagonal operator."""
+    """A function that derivatives introduce: crm, crf, mcross of a vector, the lower half of a block-diagonal operator."""
 
     def __new__(cls, name: Any, arg: Any, dimension: Any, token: Any = "") -> Any:
         return _shaped(cls, str(name), arg, dimension, str(token))
@@ -245,7 +245,7 @@ class BlockFunction(MatrixExpr):
 
 
 class _Reduction(sympy.Expr):
-    """A number that an operator has."""
+    """A scalar function of an operator."""
 
     is_commutative = True
     is_real = True

@@ -1,4 +1,4 @@
-"""From SymPy back to operator expressions: structure is kept node by node."""
+"""Convert SymPy expressions back to operator expressions: structure is kept node by node."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Reader:
         self._values = {sympy.sympify(k): v for k, v in values.items()}
 
     def read(self, e: Any) -> Any:
-        """The operator, or the scalar, that the expression stands for."""
+        """Return the operator, or the scalar, that the expression stands for."""
         if isinstance(e, MatrixExpr):
             made = self._operator(e)
             if made is None:
@@ -47,14 +47,14 @@ class Reader:
         if isinstance(e, sympy.Expr):
             made = self._scalar(e)
             return _core.scalar(made) if isinstance(made, float) else made
-        raise _core.EvaluationError(f"{e!r} is no SymPy expression of operators")
+        raise _core.EvaluationError(f"{e!r} is not a SymPy expression of operators")
 
     def _like_zero(self, e: Any) -> _core.Operator:
         if self._like is None or self._like.domain is None:
-            raise _core.EvaluationError("the expression is zero, and SymPy does not say of which spaces: like= an operator that has them")
+            raise _core.EvaluationError("the expression is zero, and SymPy does not know its spaces: give like=, an operator that has them")
         return _core.zero(self._like.domain, self._like.codomain)
 
-    # ------------------------------------------------------------------ operators; None is a zero of whatever spaces fit
+    # ------------------------------------------------------------------ operators; None is a zero of any matching spaces
     def _operator(self, e: Any) -> _core.Operator | None:
         if isinstance(e, OperatorSymbol):
             return e.operator(self._operators)
@@ -85,7 +85,7 @@ class Reader:
             return self._nonzero(e.arg).sqrt()
         if isinstance(e, BlockFunction):
             return self._function(e)
-        raise _core.EvaluationError(f"{e} ({type(e).__name__}) is no operator expression")
+        raise _core.EvaluationError(f"{e} ({type(e).__name__}) is not an operator expression")
 
     def _nonzero(self, e: Any) -> _core.Operator:
         made = self._operator(e)
@@ -121,7 +121,7 @@ class Reader:
 
     # ------------------------------------------------------------------ numbers and scalars
     def _number(self, x: Any) -> float | Fraction:
-        """A ratio as it is, anything else as a double."""
+        """Return a ratio as it is, anything else as a double."""
         value = x.subs(self._values)
         if not value.is_number or not value.is_real:
             unknown = ", ".join(sorted(map(str, value.free_symbols))) or str(value)
@@ -129,7 +129,7 @@ class Reader:
         return Fraction(int(value.p), int(value.q)) if value.is_Rational else float(value)
 
     def _scalar(self, e: Any) -> Any:
-        """A number, or a scalar expression."""
+        """Return a number, or a scalar expression."""
         if isinstance(e, OperatorTrace | OperatorLogDet | OperatorNorm):
             inside = self._nonzero(e.arg)
             return {OperatorTrace: inside.trace, OperatorLogDet: inside.logdet, OperatorNorm: inside.norm}[type(e)]()

@@ -1,4 +1,4 @@
-"""From operator expressions to SymPy: one rule per kind of node."""
+"""Convert operator expressions to SymPy: one rule per kind of node."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from .sympy_operators import (
     symbol_of,
 )
 
-# A space and its dual have one dimension: names by the space.
+# A space and its dual have the same dimension: names by the space.
 _DIMENSIONS = {"Θ": "N", "V": "n", "F": "n", "W": "n"}
 
 
 def number(x: float | Fraction) -> sympy.Expr:
-    """A Fraction, and a double that is one with a denominator up to 1000, as it is; any other double as a Float of 53 bits."""
+    """Return a Fraction, and a double equal to one with a denominator up to 1000, exactly; any other double as a Float of 53 bits."""
     value = Fraction(x)
     if isinstance(x, Fraction) or value.denominator <= 1000:
         return sympy.Rational(value.numerator, value.denominator)
@@ -38,7 +38,7 @@ def number(x: float | Fraction) -> sympy.Expr:
 
 
 def dimension(space: _core.Space | None) -> sympy.Expr:
-    """The symbol for a space's dimension; numbers stay numbers for a user's own R^n."""
+    """Return the symbol for a space's dimension; numbers stay numbers for a user's own R^n."""
     if space is None:
         return sympy.Symbol("d", integer=True, positive=True)
     name = space.name
@@ -50,12 +50,12 @@ def dimension(space: _core.Space | None) -> sympy.Expr:
 
 
 def operator(e: _core.Operator) -> Any:
-    """The matrix expression of an operator expression."""
+    """Return the matrix expression of an operator expression."""
     return _of(e, dimension(e.domain))
 
 
 def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
-    """`fits`: the dimension that an I without a space has here."""
+    """Convert an expression; `fits`: the dimension of an I without a space here."""
     kind, children = e.kind, e.children
     if kind in ("symbol", "vector", "constant", "external"):
         name = e.name if kind == "vector" else e.text() if kind in ("constant", "external") else _ascii(e)
@@ -68,7 +68,7 @@ def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
         return OperatorSum(*(_of(c, fits) for c in children))
     if kind == "product":
         made: list[Any] = []
-        for child in reversed(children):  # from the right: what an I stands before says its space
+        for child in reversed(children):  # from the right: the next factor gives the space of an I
             if child.domain is not None:
                 made.insert(0, _of(child, dimension(child.domain)))
                 fits = dimension(child.codomain)
@@ -87,12 +87,12 @@ def _of(e: _core.Operator, fits: sympy.Expr) -> Any:
 
 
 def _ascii(e: _core.Operator) -> str:
-    """A letter's name with its arguments: B(tool)."""
+    """Return a letter's name with its arguments: B(tool)."""
     return f"{e.name}({e.letter.text})" if e.letter.arguments else e.name
 
 
 def scalar(s: _core.Scalar) -> Any:
-    """The SymPy expression of a scalar expression, sums and multiples unevaluated."""
+    """Return the SymPy expression of a scalar expression, sums and multiples unevaluated."""
     name, value, operand, terms = s.kind, s.number, s.operand, s.terms
     if name == "number":
         return number(value)

@@ -277,7 +277,7 @@ def test_scalars(model):
         gradient = scalar.gradient()
         assert gradient.shape == (model.nv,)
         assert np.allclose(gradient[[1, 4, 7, 13]], [float(scalar.diff(i)) for i in (1, 4, 7, 13)], rtol=1e-10, atol=1e-10)
-    with pytest.raises(pc.EvaluationError, match="gradient over 'axes' is there for ln det"):
+    with pytest.raises(pc.EvaluationError, match="gradient over 'axes' exists for ln det"):
         MM.trace().gradient("axes")
 
 

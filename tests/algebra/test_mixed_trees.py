@@ -359,5 +359,5 @@ def test_rounding_that_a_group_hands_on_is_no_inertia(form):
 def test_of_a_robot_only():
     robot = pc.chain(3)
     soa = robot.soa.grouped([list(robot.bodies)[:2]])
-    with pytest.raises(pc.ModelError, match="no multibody model"):
+    with pytest.raises(pc.ModelError, match="not a complete multibody model"):
         soa.grouped([])

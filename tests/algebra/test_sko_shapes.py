@@ -38,14 +38,14 @@ def put(blocks, k, block):
         (dict(M=put(M, 1, np.diag([1, np.nan, 1]))), "M of body 'twig' has an entry that is not a number"),
         (dict(M=put(M, 1, 1j * M[1])), "M of body 'twig' is complex; models take real numbers"),
         (dict(M=put(M, 1, M[1].astype(str))), "M of body 'twig' is not an array of numbers"),
-        (dict(J=put(J, 1, [1, 1])), r"J of body 'twig' has the shape \(2,\); it takes \(2, 2\), one row a coordinate"),
+        (dict(J=put(J, 1, [1, 1])), r"J of body 'twig' has the shape \(2,\); it takes \(2, 2\), one row per coordinate"),
         (dict(J=put(J, 1, 1.0)), r"J of body 'twig' has the shape \(\)"),
         (dict(parents=[-1, 2, 0]), "body 1 of 'SKO model' has parent 2"),
-        (dict(parents="abc"), "parents of 'SKO model': a list, not 'abc'"),
+        (dict(parents="abc"), "parents of 'SKO model' must be a list, not 'abc'"),
         (dict(parents=[-1, 0.0, 1]), "parents of 'SKO model': a whole number, not 0.0"),
         (dict(names=["a", "a", "b"]), "names of 'SKO model': 3 different texts"),
         (dict(names=["a"]), "names of 'SKO model': 1 for 3 bodies"),
-        (dict(H=3), "H of 'SKO model': a list of one block a body"),
+        (dict(H=3), "H of 'SKO model': a list with one block per body"),
     ],
 )  # fmt: skip
 def test_blocks_that_do_not_fit(changes, says):

@@ -23,9 +23,9 @@ THREADS = 2
 
 PAGE = """# Divide and conquer
 
-`forward_dynamics(..., method="divide-and-conquer")` finds the accelerations of the articulated-body algorithm on a way of O(log N):
-pieces of the tree are joined two by two, pieces that have nothing to do with each other in different threads (`threads=`), with the same
-bits in any number of them. It is for many cores; on the machine that was measured the articulated method is faster.
+`forward_dynamics(..., method="divide-and-conquer")` computes the accelerations of the articulated-body algorithm along a critical path of
+O(log N): segments of the tree are joined two by two, independent segments in different threads (`threads=`), with the same bits in any
+number of threads. It is meant for many cores; on the measured machine the articulated method is faster.
 
 ```python
 >>> import numpy as np
@@ -38,69 +38,69 @@ True
 
 ```
 
-## How
+## Method
 
-A segment is a run of bodies with all that branches off them. Whatever is inside, two handles are left of it, the body p that it hangs on
-and its own last body j, and it does what a single body does (`cpp/recursions/divide_and_conquer.h` has every equation):
+A segment is a chain of bodies with all branches. Whatever is inside, it has two handles, the body p that carries it
+and its own last body j, and behaves like a single body (`cpp/recursions/divide_and_conquer.h` has every equation):
 
 ```
 f = P α(p) + ψ F + z        α(j) = ψ* α(p) - Υ F + y
 ```
 
-P, ψ and Υ are the book's P⁺, ψ and Υ within the segment. Two segments are one, found by eliminating the rows of Υ₁ from P₂ as the rows of
-a hinge are, with 1/u of Υ₁ = Σ u h*h in the place of a rotor inertia. Featherstone's algorithm [Int. J. Robotics Research 18(9), 1999]
-has forces at both handles and inverts inertias; here nothing but D is inverted, and massless links and welds are links like any other: an
-inertia of the size of what follows is lent to a segment's last body, and taken back from what comes to hang there.
+P, ψ and Υ are the book's P⁺, ψ and Υ within the segment. Two segments are joined by eliminating the rows of Υ₁ from P₂ like the rows of
+a hinge, with 1/u of Υ₁ = Σ u h*h in place of a rotor inertia. Featherstone's algorithm [Int. J. Robotics Research 18(9), 1999]
+has forces at both handles and inverts inertias; here only D is inverted, and massless links and welds are ordinary links: an
+inertia of the size of the outboard bodies is lent to a segment's last body, and subtracted again from the segment that is joined there.
 
-The order is an assembly tree (`cpp/dynamics/assembly_tree.h`): every body is on a chain with its largest subtree, chains and the branches
+The order is an assembly tree (`cpp/dynamics/assembly_tree.h`): every body is on a chain with its largest subtree; chains and the branches
 of a body are halved by the number of bodies. Its depth is at most 6 log₂ N + 4 over any tree, log₂ N + 1 for a chain, below 3 log₂ N + 4
 for the stars, combs, balanced and random trees of up to 10⁶ bodies that `cpp/tests/test_assembly_tree.cpp` tries. Rotations, angular
-velocities, inertias and accelerations all go along it: four passes, none of which walks the tree from end to end.
+velocities, inertias and accelerations are all computed along it: four passes, none of which visits the tree from end to end.
 
 ## Accuracy
 
-No pivot and no spread of inertias says how many digits of a solution are left; its residual does. After every solution θ̈
+No pivot and no spread of inertias shows how many digits of a solution are correct; its residual does. After every solution θ̈
 
 ```
 r = T - (ℳ + J) θ̈ - 𝒞        δ = (ℳ + J)⁻¹ r
 ```
 
-are formed, r by Newton–Euler's two sweeps with forces gathered in a wider precision, δ by the segments that are there. Where |δ| is at
-most 100 eps √nv |θ̈|, which is what is lost where nothing cancels, the solution stands. Else δ is added, as long as it shrinks and is
-more than the rounding of r can have made, and what may be left is bounded: the last δ, or the most that this rounding makes of a
-correction in any direction (`cpp/algebra/trees/sweeps/residual_rounding.h`). What may be off by more than six digits (64 √eps) is refused
-by an error that names the hinge where the digits went. So a tip of 10⁹ times the mass is solved to rounding, one of 10¹² on ten links to
-six digits or refused, and of more rounding hides from the residual what is lost; `form="ud"` of the articulated method has
-them all. `tests/dynamics/test_divide_and_conquer.py` holds it to this, and on well-proportioned trees to ten times the errors of the fast
-form, or to 100 eps √N where that has luck.
+are formed, r by the two sweeps of Newton–Euler with forces gathered in a wider precision, δ with the existing segments. If |δ| is at most
+100 eps √nv |θ̈|, the loss without cancellation, the solution is accepted. Otherwise δ is added, as long as it shrinks and exceeds the
+possible rounding of r, and the remaining error is bounded: by the last δ, or by the largest correction in any direction that this
+rounding can produce (`cpp/algebra/trees/sweeps/residual_rounding.h`). A solution that may be wrong beyond six digits (64 √eps) is refused
+with an error that names the hinge where the digits were lost. So a tip of 10⁹ times the mass is solved to rounding, one of 10¹² on ten
+links to six digits or refused, and with heavier tips rounding hides the loss from the residual; `form="ud"` of the articulated method
+keeps all digits. `tests/dynamics/test_divide_and_conquer.py` asserts this, and on well-proportioned trees ten times the errors of the
+fast form, or 100 eps √N where the fast form happens to be more accurate.
 
-Accelerations that are zero but for rounding, of what rests under forces that cancel, have no digits of their own: what is let through is
+Accelerations that are zero up to rounding, of bodies at rest under forces that cancel, have no digits of their own: the accepted error is
 100 eps √nv of gravity, ω² and forces over inertias.
 
-Where a pivot is so small that it may be noise, the articulated-body algorithm is run, too, one thread, O(N): it names the hinge that
+Where a pivot is so small that it may be noise, the articulated-body algorithm also runs, one thread, O(N): it names the hinge that
 feels no inertia. There is no form and no option of refinement.
 
 ## Cost
 
 Written by `python tests/campaigns/divide_and_conquer.py`: the figures are measured, none is typed by hand. Machine: {machine}, {cores}
-cores, Python {python}; double precision, one state, links on pins, microseconds a link of the fastest of several calls. Over: divide and
-conquer over the articulated method, one thread each. Apart: the difference of the accelerations, relative.
+cores, Python {python}; double precision, one state, links on pins, microseconds per link of the fastest of several calls. Over: divide and
+conquer over the articulated method, one thread each. Apart: the relative difference of the accelerations.
 
 | tree | links | articulated | on {threads} threads | divide and conquer | on {threads} threads | over | apart |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 {rows}
 
-Load average of the last five minutes at the end: {load}. Above 1 other work took part of the cores, and the columns on two threads, what
-they gain and what Amdahl's law makes of it are no property of the method; the page wants a quiet machine.
+Load average of the last five minutes at the end: {load}. Above 1 other work used part of the cores, and the columns on two threads,
+their gain and the estimate by Amdahl's law are not properties of the method; run the script on a quiet machine.
 
-It does not pay here. A join takes 1,400 to 4,000 operations and its segment a kilobyte; a link of the articulated method takes some 400,
-in kernels of the machine's instruction set. On a chain of {links} links that is {ratio} times the time on one thread; two threads gain
-{gain}. With no other loss it takes {ideal} cores to draw level; by Amdahl's law, with the share of {serial} that two threads leave serial
-here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started six times a state, some 50 µs
-each time, and the residual is one thread's sweep: below 10⁴ links they gain nothing.
+The method does not pay on this machine. A join takes 1,400 to 4,000 operations and its segment a kilobyte; a link of the articulated
+method takes some 400, in kernels of the machine's instruction set. On a chain of {links} links that is {ratio} times the time on one
+thread; two threads gain {gain}. With no other loss it takes {ideal} cores to draw level; by Amdahl's law, with the share of {serial} that
+two threads leave serial here, {least}. The critical path is {depth} joins a pass instead of {links} links, but threads are started six
+times a state, some 50 µs each time, and the residual is one thread's sweep: below 10⁴ links threads gain nothing.
 
-Batches want none of this: states are shared out by `threads=` with the articulated method, in packs. Trees with several large subtrees
-are shared out by it, too. What is left is one state of one very long chain on a machine of many cores.
+Batches do not need this method: `threads=` shares their states out with the articulated method, in packs, and it also shares out trees with
+several large subtrees. The remaining use is one state of one very long chain on a machine with many cores.
 """
 
 

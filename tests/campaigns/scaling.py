@@ -20,15 +20,15 @@ from pycraft import _core
 from pycraft.ensembles.backends import cores
 from pycraft.ensembles.work import SceneWork
 
-PAGE = """# How sweeps scale
+PAGE = """# Scaling of sweeps
 
 Written by `python tests/campaigns/scaling.py`: the figures are measured, none is typed by hand. Machine: {machine}, {cores} cores,
 Python {python}.
 
-A sweep hands runs to workers a quarter of a second at a time. What it costs beside the runs: a Python call for each (`Scene.simulate`,
-its checks, what is kept of it), and, for processes and Dask, the start of the interpreters, which import the package, and what comes
-back. Runs are in the core and let other threads run, so threads are the default; an effect or measure in Python keeps the interpreter's
-lock, and wants processes.
+A sweep gives each worker a quarter of a second of runs at a time. The overhead is a Python call for each run (`Scene.simulate`,
+its checks, its results), and, for processes and Dask, the start of the interpreters, which import the package, and the transfer of
+results. Runs in the core release the GIL, so threads are the default; an effect or measure in Python holds the GIL, and needs
+processes.
 
 | sweep | on | workers | s | runs/s | over one thread |
 | --- | --- | ---: | ---: | ---: | ---: |
@@ -36,7 +36,7 @@ lock, and wants processes.
 
 Starting workers is part of the time: {starts}. All give the same bits.
 
-## Side by side in packs
+## Runs in packs
 
 A thread takes {width} runs at a time and computes their accelerations together ([ensembles.md](ensembles.md)). One thread, {runs} runs,
 the best of {rounds} sweeps each, taken in turns; all give the same bits:
@@ -45,19 +45,19 @@ the best of {rounds} sweeps each, taken in turns; all give the same bits:
 | --- | ---: | ---: | ---: |
 {packs}
 
-Only accelerations are done together. They are most of a run by itself, and the smaller part of one in a pack: effects with the poses and
-twists that they read, the integrator's sums, the change from run to run, and what Python does with each run stay as they are. So the gain
+Only accelerations are computed together. They are most of the time of a single run, and the smaller part in a pack: effects with the poses
+and twists that they read, the integrator's sums, the change from run to run, and the Python work per run are not shared. So the gain
 is far less than the number of lanes, and less for short runs and small models.
 
 ## On a cluster
 
-`on="dask"` starts a cluster of this machine, a worker a core. Where there is one, its address is enough:
+`on="dask"` starts a cluster on this machine, one worker per core. For an existing cluster, pass its address:
 
 ```python
 pc.sweep(scene, samples, 10.0, on="tcp://scheduler:8786", output="runs/")
 ```
 
-or a client that you have made, by any of Dask's ways of starting clusters (`dask-jobqueue` for SLURM and PBS, `dask-kubernetes`):
+or a client, from any of Dask's ways of starting clusters (`dask-jobqueue` for SLURM and PBS, `dask-kubernetes`):
 
 ```python
 from dask.distributed import Client
@@ -68,10 +68,10 @@ cluster.scale(jobs=10)
 pc.sweep(scene, samples, 10.0, on=Client(cluster), output="runs/")
 ```
 
-Workers need the package, and the modules that functions come from; functions of a notebook go along. Each thread of a worker has a
-scene of its own, so any number of threads is right, and one is best where effects are in Python. Results come to the process that
-called, which writes them: the folder is on its disk, and nobody else needs to see it. A worker that is lost is made good by Dask; what
-it had is run again. A job whose time ends is called again with the same folder, and goes on.
+Workers need the package, and the modules that define functions; functions of a notebook are sent along. Each thread of a worker has its
+own scene, so any number of threads is correct, and one is best for effects in Python. The calling process receives the results and writes
+them: the folder is on its disk, and workers need no access to it. Dask replaces a lost worker, and its
+runs are repeated. If a job's time ends, call it again with the same folder, and it continues.
 """
 
 

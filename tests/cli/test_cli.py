@@ -77,7 +77,7 @@ def test_tour():
     result = runner.invoke(app, ["tour", "puma560"])
     assert result.exit_code == 0, result.output
     parts = ["The operators, typed as on paper", "Factor and invert", "Beyond the theorems", "Every theorem"]
-    for part in (*parts, "smallest counterexample", "What it costs"):
+    for part in (*parts, "smallest counterexample", "Cost: chains of rods"):
         assert part in result.output
     typed = [line.rstrip() for line in result.output.splitlines() if ">>>" in line]
     assert typed and max(map(len, typed)) <= 80  # what is to be typed goes on in no second line

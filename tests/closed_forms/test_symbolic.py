@@ -316,7 +316,7 @@ def test_what_has_no_closed_form_is_said():
     ):
         with pytest.raises(pc.EvaluationError, match=words):
             forms.evaluate(expression)
-    with pytest.raises(TypeError, match="not of list"):
+    with pytest.raises(TypeError, match="not a list"):
         forms.evaluate([1])
     with pytest.raises(AttributeError, match="no closed form is called 'Q'"):
         forms.Q  # noqa: B018 - asking raises
@@ -324,13 +324,13 @@ def test_what_has_no_closed_form_is_said():
         symbolic(model, "a")
     with pytest.raises(pc.ModelError, match="no parameter is called"):
         symbolic(model, parameters={("upper", "mass"): "m"})
-    with pytest.raises(pc.ModelError, match=r"com of 'body0': an array \(3,\) is asked for"):
+    with pytest.raises(pc.ModelError, match=r"com of 'body0': an array \(3,\) is needed"):
         symbolic(model, parameters={("body0", "com"): "c"})
     with pytest.raises(pc.ModelError, match="there are 'numeric', 'symbolic'"):
         symbolic(model, parameters="letters")
     with pytest.raises(pc.ModelError, match="a parameter and a coordinate of one name"):
         symbolic(model, parameters={("body0", "mass"): sympy.Symbol("q1", real=True)})
-    with pytest.raises(pc.ModelError, match="made of a Multibody"):
+    with pytest.raises(pc.ModelError, match="need a Multibody"):
         symbolic(soa)
     with pytest.raises(pc.ModelError, match="no coordinate"):
         forms.Delta("elbow")

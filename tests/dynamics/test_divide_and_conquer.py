@@ -260,7 +260,7 @@ def test_states_parts_and_edits():
 
 def test_it_takes_no_form():
     model = pc.chain(3)
-    with pytest.raises(pc.EvaluationError, match="method 'divide-and-conquer' has no form, no refinement"):
+    with pytest.raises(pc.EvaluationError, match="method 'divide-and-conquer' takes no form=, refine="):
         model.forward_dynamics(form="ud", **WAY)
     with pytest.raises(pc.EvaluationError, match="threads=0"):
         model.forward_dynamics(threads=0, **WAY)

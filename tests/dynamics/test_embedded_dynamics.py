@@ -219,8 +219,8 @@ def test_refusals():
         with pytest.raises(error, match=says):
             model.constrained_dynamics(q, v, **({"method": "embed"} | how))
 
-    call(pc.EvaluationError, "'fast' alone", form="ud")
-    call(pc.EvaluationError, "'same' alone; take a wider precision", residual="wider")
+    call(pc.EvaluationError, "only 'fast' is available", form="ud")
+    call(pc.EvaluationError, "only 'same' is available; use a wider precision", residual="wider")
     call(pc.EvaluationError, "assemble", alpha=1.0)
     call(pc.EvaluationError, "assemble", beta=1.0)
     call(pc.EvaluationError, "has no independent coordinates", method="augment", independent=[first])

@@ -301,7 +301,7 @@ def test_refusals_of_numbers_and_of_operators():
         model.hybrid_dynamics([0, 0, 0], [0, 0, 0], [0, 0], [0, 0, 0], ["hinge0"])
     with pytest.raises(pc.EvaluationError, match="form"):
         model.hybrid_dynamics(prescribed="hinge0", form="slow")
-    with pytest.raises(pc.ModelError, match="it is no multibody model of its own"):
+    with pytest.raises(pc.ModelError, match="it is not a complete multibody model"):
         model.soa.grouped([["body0", "body1"]]).free(["hinge0"])
     with pytest.raises(pc.ModelError, match="prescribed twice"):
         model.soa.free(["hinge0", "hinge[0-1]"])

@@ -151,8 +151,8 @@ def test_what_is_asked_wrongly():
         for names, error, words in (
             ("nose", pc.ModelError, "nose"),
             (["panda_link7", "nose"], pc.ModelError, "nose"),
-            (3, pc.ModelError, "text, not by 3"),
-            (["panda_link7", 3], pc.ModelError, "text, not by 3"),
+            (3, pc.ModelError, "string, not by 3"),
+            (["panda_link7", 3], pc.ModelError, "string, not by 3"),
             ([], pc.ModelError, "at least one node"),
         ):
             with pytest.raises(error, match=words):

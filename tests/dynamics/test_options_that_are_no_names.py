@@ -67,7 +67,7 @@ def test_what_is_no_name_is_refused_whatever_takes_it(given):
         with pytest.raises(pc.EvaluationError, match="^form="):
             call("body1", form=given)
     for call in (arm.subgraph, lambda **how: arm.path("body0", "body1", **how)):
-        with pytest.raises(pc.ModelError, match="the base of a part is called by a text"):
+        with pytest.raises(pc.ModelError, match="the base of a part is named by a string"):
             call(base=given)
     if not isinstance(given, np.ndarray):
         return
@@ -92,10 +92,10 @@ def test_what_is_on_or_off_is_true_or_false(given):
         "impulsive": lambda **how: arm.lock("hinge1", **how),
         "keep_pose": lambda **how: frame.attach("body0", **how),
     }.items():
-        with pytest.raises(pc.ModelError, match=f"^{what}=.*: True or False"):
+        with pytest.raises(pc.ModelError, match=f"^{what}=.*: give True or False"):
             call(**{what: given})
     for call in (arm.linearize, arm.equilibrium):
-        with pytest.raises(pc.ModelError, match="^loops=.*: True or False"):
+        with pytest.raises(pc.ModelError, match="^loops=.*: give True or False"):
             call(loops=given)
     assert arm.lock("hinge1", impulsive=np.bool_(False)).loss == 0
 
@@ -147,7 +147,7 @@ def test_numbers_of_an_integration_and_poses_of_copies():
     for given in (None, "arm", [], 1):
         with pytest.raises(pc.ModelError, match="a description is a dictionary"):
             pc.Multibody.from_description(given)
-    with pytest.raises(pc.ModelError, match="a set of operators is called by a text"):
+    with pytest.raises(pc.ModelError, match="a set of operators is named by a string"):
         arm.soa(None)
     with pytest.raises(pc.ModelError, match="batch: a number of states, from 0 to"):
         arm.neutral(10**30)

@@ -102,9 +102,9 @@ def test_refusals():
         model.equipartition([0, 0], -1.0)
     with pytest.raises(pc.EvaluationError, match="boltzmann=inf"):
         model.fixman_torque([0, 0], boltzmann=np.inf)
-    with pytest.raises(pc.EvaluationError, match="count is of one state"):
+    with pytest.raises(pc.EvaluationError, match="count needs one state"):
         model.equipartition([[0, 0]], count=3)
-    with pytest.raises(pc.EvaluationError, match="count=-1: how many draws"):
+    with pytest.raises(pc.EvaluationError, match="count=-1: the number of draws"):
         model.equipartition([0, 0], count=-1)
     with pytest.raises(pc.ModelError, match="takes 2 numbers"):
         model.equipartition([0, 0, 0])

@@ -63,7 +63,7 @@ def test_two_together():
         (lambda: Samples({}), "a mapping of names to values"),
         (lambda: Samples({"a": [1], "b": [1, 2]}), "as many values of each name, not 1 of a, 2 of b"),
         (lambda: Samples({"a": []}), "samples of 'a': there is one value at least"),
-        (lambda: Samples({"a": 3}), "samples of 'a': a list, not 3"),
+        (lambda: Samples({"a": 3}), "samples of 'a' must be a list, not 3"),
         (lambda: pc.samples.random(0, {"a": (0, 1)}), "count=0: there is one sample at least"),
         (lambda: pc.samples.random(3, {"a": (1, 0)}), r"range of 'a': \(low, high\), two finite numbers in this order, not \(1, 0\)"),
         (lambda: pc.samples.random(3, {"a": "x"}), "range of 'a': .*a frozen distribution of scipy.stats, not 'x'"),

@@ -82,7 +82,7 @@ def test_what_is_no_operator_space_or_matrix(arm, given):
     with pytest.raises(pc.Error, match="'L' has shape|from_scipy: 'L' is not an array of numbers|it takes"):
         pc.interop.from_scipy(given, phi.domain, phi.codomain)
     if not isinstance(given, str):
-        with pytest.raises(pc.ModelError, match="an operator is called by a text, not by"):
+        with pytest.raises(pc.ModelError, match="an operator is named by a string, not by"):
             pc.interop.from_scipy(phi.dense(), phi.domain, phi.codomain, given)
 
 
@@ -96,7 +96,7 @@ def test_what_is_no_model(given):
     for call in calls:
         with pytest.raises(pc.ModelError, match="takes a model, not"):
             call(given)
-    with pytest.raises(pc.ModelError, match="is named by its path, not by"):
+    with pytest.raises(pc.ModelError, match="is given by its path, not by"):
         mujoco.compiled(given if not isinstance(given, str) else 4)
     with pytest.raises(pc.ModelError, match="name_of takes an MjModel, not"):
         mujoco.name_of(given)
@@ -108,7 +108,7 @@ def test_what_is_no_model(given):
 
 
 def test_a_scene_is_told_where_its_model_is():
-    with pytest.raises(pc.ModelError, match="MJCF takes a model, not <scene.*that of a scene is scene.model"):
+    with pytest.raises(pc.ModelError, match="MJCF takes a model, not <scene.*a scene's model is scene.model"):
         pc.interop.export.to_mjcf(pc.mechanisms.pendulum())
 
 

@@ -90,6 +90,6 @@ def test_whether_it_is_reached_is_its_truth():
     assert arm.solve_ik({"tip": (1.5, 1.0, 0.0)}, [0.1, 0.2, 0.3])
     assert not arm.solve_ik({"tip": (9.0, 0.0, 0.0)}, [0.1, 0.2, 0.3])
     both = arm.solve_ik({"tip": [(1.5, 1.0, 0.0), (9.0, 0.0, 0.0)]}, [0.1, 0.2, 0.3])
-    with pytest.raises(pc.ModelError, match=r"a batch of 2 is neither reached nor not: take .reached.all\(\) or .reached.any\(\)"):
+    with pytest.raises(pc.ModelError, match=r"a batch of 2 is neither reached nor not: use .reached.all\(\) or .reached.any\(\)"):
         bool(both)
     assert both[0] and not both[1]

@@ -183,13 +183,13 @@ def test_modes_as_text_and_pictures(monkeypatch):
     ax = modes.plot(0, phases=3)
     assert "Hz" in ax.get_title() and len(ax.lines) + len(ax.collections) > 3
     mpl.pyplot.close("all")
-    with pytest.raises(pc.EvaluationError, match="mode 5 is not there; there are 2"):
+    with pytest.raises(pc.EvaluationError, match="there is no mode 5; the model has 2"):
         modes.plot(5)
     with pytest.raises(pc.ModelError, match="mode: a whole number, not 'first'"):
         modes.plot("first")
     with pytest.raises(pc.ModelError, match="amplitude is not an array of numbers"):
         modes.plot(0, amplitude="wide")
-    with pytest.raises(pc.EvaluationError, match="amplitude=nan: how far the coordinate swings"):
+    with pytest.raises(pc.EvaluationError, match="amplitude=nan: give the amplitude of the coordinate"):
         modes.plot(0, amplitude=np.nan)
     free = pc.tree([-1], ["free"], seed=1)
     drifting = free.linearize(free.zero_q(), np.zeros(6)).modes()
@@ -269,13 +269,13 @@ def test_a_linear_model_is_true_but_of_no_states():
     [
         (lambda m, f: m.linearize(inputs=["elbow"]), "inputs: no hinge or coordinate"),
         (lambda m, f: m.linearize(inputs=[3]), "inputs takes names, or a list of them, not 3"),
-        (lambda m, f: m.linearize(outputs="hinge0"), "outputs: 'hinge0' is none; there are q.<name>, v.<name>"),
+        (lambda m, f: m.linearize(outputs="hinge0"), "outputs: unknown output 'hinge0'; there are q.<name>, v.<name>"),
         (lambda m, f: m.linearize(outputs="q.elbow"), "has no q.elbow; after 'q' there are hinge0, hinge1"),
         (lambda m, f: m.linearize(outputs="vdot.elbow"), "has no vdot.elbow; after 'vdot' there are hinge0, hinge1"),
         (lambda m, f: m.linearize(outputs="position.hand"), "no node or body of 'chain of 2 rods' is called 'hand'"),
         (lambda m, f: m.linearize(outputs=["q.hinge0", "v.hinge0", "q.hinge0"]), "outputs: 'q.hinge0' is named twice"),
-        (lambda m, f: f.controllability(np.nan), "tolerance=nan: below which share a singular value is zero"),
-        (lambda m, f: f.observability(-1.0), "tolerance=-1: below which share a singular value is zero"),
+        (lambda m, f: f.controllability(np.nan), "tolerance=nan: the relative size below which a singular value is zero"),
+        (lambda m, f: f.observability(-1.0), "tolerance=-1: the relative size below which a singular value is zero"),
         (lambda m, f: f.discrete(0), "dt=0: a step is a positive number of seconds"),
         (lambda m, f: f.discrete(1e300), "dt=1e+300: by 'zoh' 'chain of 2 rods' leaves the range of its numbers"),
         (lambda m, f: f.discrete(0.1, "exact"), "method='exact': there are 'zoh'"),
@@ -283,8 +283,8 @@ def test_a_linear_model_is_true_but_of_no_states():
         (lambda m, f: f.place("v.hinge0", of="zz"), "of='zz': there are 'states', 'inputs' and 'outputs'"),
         (lambda m, f: f.place("v.hinge0", of=None), "of=None: there are 'states', 'inputs' and 'outputs'"),
         (lambda m, f: f.select(inputs="tau.elbow"), "has no input 'tau.elbow'; there are tau.hinge0, tau.hinge1"),
-        (lambda m, f: m.linearize([[0, 0]]).modes(), "modes() is of one state; this is a batch of 1: take one by its index"),
-        (lambda m, f: m.linearize([[0, 0]]).to_scipy(), "to_scipy() is of one state"),
+        (lambda m, f: m.linearize([[0, 0]]).modes(), "modes() takes one state; this is a batch of 1: select one by its index"),
+        (lambda m, f: m.linearize([[0, 0]]).to_scipy(), "to_scipy() takes one state"),
         (lambda m, f: m.linearize([0, np.nan]), "entry 0 is nan"),
     ],
 )

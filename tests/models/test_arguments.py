@@ -161,7 +161,7 @@ def test_limits_that_are_set_are_drawn_from():
         (dict(hinge="custom", subhinges=[{"kind": "pin", "axes": (0, 0, 1)}]), "a subhinge has no 'axes'; there are kind, axis"),
         (dict(hinge="custom", subhinges=[{"kind": "pin", "pitch": 1}]), "of kind 'pin' has no pitch"),
         (dict(hinge="custom"), "a custom hinge takes subhinges"),
-        (dict(hinge="custom", subhinges=[{"kind": "pin"}], axis=(0, 0, 1)), "and nothing beside"),
+        (dict(hinge="custom", subhinges=[{"kind": "pin"}], axis=(0, 0, 1)), "and nothing else"),
         (dict(hinge="pin", subhinges=[{"kind": "pin"}]), "subhinges belong to a hinge of kind 'custom', not 'pin'"),
         (dict(hinge="weld", axis=(0, 0, 1)), "of kind 'weld' takes 0 axes, not 1"),
         (dict(hinge="free", point=(0, 0, 1)), "of kind 'free' has no point"),
@@ -277,7 +277,7 @@ def test_descriptions_are_checked():
     for change, says in (
         (lambda d: d.pop("bodies"), "'bodies' is missing"),
         (lambda d: d["bodies"][1].pop("hinge"), "'hinge' is missing"),
-        (lambda d: d["bodies"][1].update(parent=7), "speaks of number 7"),
+        (lambda d: d["bodies"][1].update(parent=7), "refers to number 7"),
         (
             lambda d: d["bodies"][1]["hinge"].update(kind="ball"),
             "has the subhinges ball, not pin, pin; a hinge of your own is of kind 'custom'",

@@ -141,12 +141,12 @@ def test_loops_that_conflict_are_named():
     model.add_loop("body1", hinge="ball", point=(1, 0, 0), position=(0.5, 0, 0), name="there")
     with pytest.raises(
         pc.ModelError,
-        match=r"each can be closed by itself, and loop 'here', loop 'there' not together.*0\.25 of '(here|there): along x', 0\.25 of",
+        match=r"each can be closed by itself, but loop 'here', loop 'there' not together.*0\.25 of '(here|there): along x', 0\.25 of",
     ):
         model.assemble([0.3, 0.4])
     model.add_loop("body0", hinge="ball", position=(0, 0, 2), name="off the plane")
     with pytest.raises(
-        pc.ModelError, match=r"loop 'off the plane' cannot be closed even without the others.*left are 2 of 'off the plane: along z'"
+        pc.ModelError, match=r"loop 'off the plane' cannot be closed even alone.*these remain: 2 of 'off the plane: along z'"
     ):
         model.assemble([0.3, 0.4], starts=2)
 
@@ -156,7 +156,7 @@ def test_velocities_that_conflict_are_named():
     q = model.assemble([0.7, 0.1, 0.1]).q
     with pytest.raises(
         pc.ModelError,
-        match=r"no velocities of 'four-bar' keep its loops with 'crank', 'coupler', 'rocker' kept: left are .*'closure: along",
+        match=r"no velocities of 'four-bar' keep its loops with 'crank', 'coupler', 'rocker' kept: these remain: .*'closure: along",
     ):
         model.assemble(q, [1.0, 0.0, 0.0], fix=["crank", "coupler", "rocker"], tolerance=1e-9)
 
@@ -167,7 +167,7 @@ def test_velocities_that_conflict_are_named():
         (dict(q0=[0.0]), r"q of 'four-bar'"),
         (dict(fix="piston"), r"no hinge or coordinate of 'four-bar' is called 'piston'"),
         (dict(fix={"crank": 0.4}), r"named by a list, without values, which are those of a state: \['crank'\], not \{'crank': 0.4\}"),
-        (dict(starts=0), r"starts: how many are tried, at least 1, not 0"),
+        (dict(starts=0), r"starts: the number of starting states, at least 1, not 0"),
         (dict(starts=1.5), r"starts: a whole number"),
         (dict(tolerance=0), r"tolerance: a positive number, not 0"),
         (dict(tolerance=np.nan), r"tolerance: a positive number"),
@@ -187,7 +187,7 @@ def test_what_is_beyond_all_reach_is_said_in_metres(far):
     model = pc.chain(3)
     model.add_loop("body2", hinge="ball", position=(far, 0, 0), name="away")
     with pytest.raises(
-        pc.ModelError, match=rf"loop 'away' cannot be closed even without the others.*left .*{re.escape(f'{far:g}')} of 'away: along x'"
+        pc.ModelError, match=rf"loop 'away' cannot be closed even alone.*remain: .*{re.escape(f'{far:g}')} of 'away: along x'"
     ):
         model.assemble([0.1, 0.2, 0.3], starts=3)
 
@@ -202,7 +202,7 @@ def test_part_of_a_rotation_is_not_kept():
     model.add_body("ball", hinge="ball", mass=1.0)
     model.add_loop("ball", hinge="weld", name="weld")
     with pytest.raises(
-        pc.ModelError, match="hinge 'ball' has a rotation, of which single coordinates cannot be kept; fix all of it: 'ball'"
+        pc.ModelError, match="hinge 'ball' has a rotation, and its coordinates cannot be fixed one by one; fix the hinge: 'ball'"
     ):
         model.assemble(fix=[0])
     assert model.assemble([0.5, 0.5, 0.5, -0.5]).q[0] != 0.5
@@ -293,10 +293,10 @@ def test_rank_does_not_hang_on_the_units_of_rows():
 def test_mobility_off_the_loops_is_refused():
     model = four_bar(0.4, 1.0, 0.8, 1.0)
     with pytest.raises(
-        pc.ModelError, match=r"'four-bar' is not on its loops: 'closure: along x' is off by 1\.2; mobility is asked at states of assemble"
+        pc.ModelError, match=r"'four-bar' is not on its loops: 'closure: along x' is off by 1\.2; mobility needs a state on the loops"
     ):
         model.mobility([0.0, 0.0, 0.0])
-    with pytest.raises(pc.ModelError, match=r"mobility is that of one state, not of an array \(2, 3\)"):
+    with pytest.raises(pc.ModelError, match=r"mobility takes one state, not an array \(2, 3\)"):
         model.mobility(np.zeros((2, 3)))
 
 

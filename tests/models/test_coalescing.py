@@ -232,7 +232,7 @@ def test_what_hung_on_it_and_was_removed_or_coalesced():
         (lambda m: m.coalesce("body1"), r"body 'body1' hangs on hinge 'hinge1' \(pin\), which moves: lock the hinge first"),
         (lambda m: m.coalesce("arm"), "no body of 'chain of 5' is called 'arm'"),
         (lambda m: m.coalesce("body2"), "'body2' is welded to body 'body1' and is a node of it; .* or split it off where it was coalesced"),
-        (lambda m: m.coalesce(7), "a body is called by a text, not by 7"),
+        (lambda m: m.coalesce(7), "a body is named by a string, not by 7"),
         (lambda m: m.split("body1"), "body 'body1' of 'chain of 5' is not coalesced; coalesced are body2"),
         (lambda m: m.split("arm"), "body 'arm' of 'chain of 5' is not coalesced"),
         (lambda m: m.subgraph(root="body0").coalesce(), "coalesce bodies there, and take the part anew"),

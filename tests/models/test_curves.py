@@ -51,6 +51,7 @@ CURVES = {
     "function": {"curve": helix, "parameters": (-1.0, 4.0)},
     "closed function": {"curve": knot, "parameters": (0, 2 * np.pi), "closed": True},
     "open spline": {"curve": WAVE},
+    "natural spline": {"curve": WAVE, "ends": "natural"},
     "closed spline": {"curve": [*WAVE, WAVE[0]], "closed": True},
     "parameters": {"curve": WAVE, "parameters": [-3.0, 0.0, 2.0, 9.0]},
     "polynomials": {"curve": CubicSpline([0, 1, 3, 4], WAVE)},
@@ -128,6 +129,30 @@ def test_a_spline_nears_its_circle():
     assert 14 < off[0] / off[1] < 18 and 14 < off[1] / off[2] < 18
     exact = bead().add_curve("bead", curve=lambda s: (np.cos(s), np.sin(s), 0), parameters=(0, 2 * np.pi), closed=True)
     assert np.abs(exact.residual(circle)).max() < 1e-14
+
+
+def test_an_open_spline_nears_its_arc_up_to_its_ends():
+    """As the fourth power of its points' distance, 16 for two, also beside the ends; natural ones as the second, 4."""
+    far = np.linspace(0, 1.5, 101)
+    arc = np.stack([np.cos(far), np.sin(far), 0 * far], axis=1)
+    for ends, ratio in (({}, 16), ({"ends": "not-a-knot"}, 16), ({"ends": "natural"}, 4)):
+        off = []
+        for n in (9, 17, 33):
+            at = np.linspace(0, 1.5, n)
+            points = np.stack([np.cos(at), np.sin(at), 0 * at], axis=1)
+            off.append(np.abs(bead().add_curve("bead", curve=points, **ends).residual(arc)).max())
+        assert 0.85 * ratio < off[0] / off[1] < 1.25 * ratio and 0.85 * ratio < off[1] / off[2] < 1.25 * ratio, (ends, off)
+
+
+def test_ends_that_a_curve_has_not_are_refused():
+    with pytest.raises(
+        pc.ModelError, match=r"loop 'wire': the ends of a curve through points are 'not-a-knot' or 'natural', not 'clamped'"
+    ):
+        bead().add_curve("bead", curve=WAVE, ends="clamped", name="wire")
+    with pytest.raises(pc.ModelError, match=r"a closed curve has no ends; leave out ends='natural'"):
+        bead().add_curve("bead", curve=ring(8), closed=True, ends="natural")
+    with pytest.raises(pc.ModelError, match=r"a function and a piecewise polynomial have ends of their own; leave out ends='natural'"):
+        bead().add_curve("bead", curve=helix, parameters=(0, 1), ends="natural")
 
 
 def test_at_a_centre_of_curvature_rows_are_numbers():

@@ -121,7 +121,7 @@ BAD = {
     "zero quaternion": (
         [BASE, ARM, joint('<origin quat_xyzw="0 0 0 0"/>')],
         5,
-        "joint 'elbow': <origin> quat_xyzw has length 0; no rotation is 0 0 0 1",
+        "joint 'elbow': <origin> quat_xyzw has length 0; the identity is 0 0 0 1",
     ),
     "rpy and quaternion": (
         [BASE, ARM, joint('<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/>')],

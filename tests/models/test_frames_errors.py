@@ -32,13 +32,13 @@ def test_unknown_frames_are_told_with_the_nearest(arm):
         arm.add_frame("new", on="bitt")
     with refused(KeyError, "no frame of"):
         arm.frames["nothing"]
-    with refused(pc.ModelError, "a frame is called by a text, not by 3"):
+    with refused(pc.ModelError, "a frame is named by a string, not by 3"):
         arm.frame(3)
     assert "bit" in arm.frames and "nothing" not in arm.frames and len(arm.frames) == 5
 
 
 def test_states_come_first_and_frames_by_their_word(arm):
-    with refused(pc.ModelError, "the frame that 'tool' is seen from is given as wrt='body1'"):
+    with refused(pc.ModelError, "the reference frame of 'tool' is given as wrt='body1'"):
         arm.frame("tool").pose("body1", t=0.0)
     with refused(pc.ModelError, "given as wrt='body1'"):
         arm.frame("tool").velocity(arm.frame("body1"))
@@ -126,7 +126,7 @@ def test_what_a_body_takes_with_it(arm):
         words = "frame 'tool' of 'chain of 3 rods' stood on 'body2', which is no longer there: attach it to another frame, or remove it"
         with refused(pc.ModelError, words):
             question()
-    assert repr(arm.frame("tool")) == "<frame 'tool': not there, or left without what it stood on>"
+    assert repr(arm.frame("tool")) == "<frame 'tool': missing, or without its carrier>"
     with refused(pc.ModelError, "frame 'tool' is not copied: no frame of 'chain of 3 rods' is called 'body2'"):
         copy.copy(arm)
     arm.frame("tool").attach("body1")

@@ -60,7 +60,7 @@ def test_a_name_that_a_loop_has_is_refused_and_nothing_is_copied():
 
 def test_merged_models_bring_their_loops():
     other, model = closed(), pc.chain(2)
-    with pytest.raises(pc.ModelError, match="loop 'ground' is closed at the base of 'legs', which is put elsewhere here"):
+    with pytest.raises(pc.ModelError, match="loop 'ground' is closed at the base of 'legs', which is placed elsewhere here"):
         model.merge(other, "body1")
     assert len(model.bodies) == 2 and not len(model.loops)
     model.merge(other, prefix="his ")
@@ -150,11 +150,11 @@ def test_a_coupling_holds_by_the_hinges_that_are_locked(tmp_path):
     model.unlock()
     model.q, model.v = closed().q, closed().v
     np.testing.assert_array_equal(rows(model, *model.loops), before)
-    with pytest.raises(pc.ModelError, match=r"coupling 'gear' would have no coordinate left to hold, of 'l thigh', 'r thigh': lock fewer"):
+    with pytest.raises(pc.ModelError, match=r"coupling 'gear' would have no free coordinate left, of 'l thigh', 'r thigh': lock fewer"):
         model.lock("? thigh", impulsive=True)
     assert model.locked == [] and model.nv == 5
     model.lock("l thigh", impulsive=True)
-    with pytest.raises(pc.ModelError, match="coupling 'gear' would have no coordinate left"):
+    with pytest.raises(pc.ModelError, match="coupling 'gear' would have no free coordinate left"):
         model.lock("r thigh", impulsive=True)
 
 

@@ -20,7 +20,7 @@ LOOPS = [
     (dict(b="wall"), r"is of the base with itself: the base and 'wall'"),
     (dict(b="bodi2"), r"no frame of 'chain of 3 rods' is called 'bodi2'; the nearest is 'body2'"),
     (dict(b="body2", a="nowhere at all"), r"no frame of 'chain of 3 rods' is called 'nowhere at all'"),
-    (dict(b=7), r"an end of a loop is called by a text, not by 7"),
+    (dict(b=7), r"an end of a loop is named by a string, not by 7"),
     (dict(b="body2", hinge="hinge"), r"hinge"),
     (dict(b="body2", axis=(0, 0, 0)), r"its axis has length 0"),
     (dict(b="body2", axis=(0, 0, np.nan)), r"loop|hinge 'base to body2'"),
@@ -81,7 +81,7 @@ CURVES = [
     (dict(curve=LINE, on="tip"), r"is of 'body2' with itself: 'tip' and 'body2' stand on it both"),
 ]
 OTHERS = [
-    ("add_rolling", dict(b="body2", kind="cube"), r"kind='cube' of what rolls: there are 'wheel', 'ball', 'blade'"),
+    ("add_rolling", dict(b="body2", kind="cube"), r"kind='cube' of a rolling body: there are 'wheel', 'ball', 'blade'"),
     ("add_rolling", dict(b="body2"), r"a wheel rolls on its radius: give radius= in metres"),
     ("add_rolling", dict(b="body2", kind="blade", radius=1.0), r"a blade has no radius"),
     ("add_rolling", dict(b="body2", radius=-1.0), r"a radius is a positive number \(m\), not -1"),
@@ -133,7 +133,7 @@ def test_a_loop_whose_body_is_gone():
             match="loop 'taken' of 'chain of 3 rods' has lost what it was declared on: .*'body2'.*; remove it, or declare it anew",
         ):
             ask()
-    assert "left without what it was declared on" in repr(loop) and len(model.loops) == 2
+    assert "without the bodies that it was declared on" in repr(loop) and len(model.loops) == 2
     loop.remove()
     with pytest.raises(pc.ModelError, match="coupling 'gear' of 'chain of 3 rods' has lost what it was declared on"):
         model.loops.jacobian()

@@ -307,7 +307,7 @@ def test_conversion_errors():
     with pytest.raises(pc.ModelError, match="hinge 'hinge1' of 'tree of 2' is free and not alone on the base"):
         conventions.permutation(model)
     model = pc.chain(1, "free")
-    with pytest.raises(pc.ModelError, match=r"q of 'chain of 1 rods' takes 7 numbers, not an array \(6,\)"):
+    with pytest.raises(pc.ModelError, match=r"q of 'chain of 1 rods' takes 7 values, not an array \(6,\)"):
         conventions.to_mujoco(model, np.zeros(6), np.zeros(6))
-    with pytest.raises(pc.ModelError, match="a free hinge's quaternion has no direction"):
+    with pytest.raises(pc.ModelError, match="a free hinge's quaternion has zero length"):
         conventions.to_mujoco(model, np.zeros(7), np.zeros(6))

@@ -78,7 +78,7 @@ def test_a_motion_that_is_singular_everywhere(count):
 @pytest.mark.parametrize(
     ("q", "said"),
     [
-        ([0.0, 0.0, np.pi], r"samples \(B, 3\), not of an array \(3,\)"),
+        ([0.0, 0.0, np.pi], r"samples \(B, 3\), not an array \(3,\)"),
         ([[0.0, 0.0, np.pi], [0.5, 0.0, 0.0]], "not on its loops at sample 1: 'closure: "),
         ([[0.0, 0.0, np.nan]], "q of hinge 'rocker': entry 0 is nan"),
         (np.zeros((2, 4)), "takes 3 numbers"),

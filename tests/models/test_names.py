@@ -46,7 +46,7 @@ def arm():
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_half_a_character(arm, what):
-    with pytest.raises(pc.ModelError, match=r"is called by a text, and 'a\\ud800' has half a character, which no file holds"):
+    with pytest.raises(pc.ModelError, match=r"is named by a string, and 'a\\ud800' has half a surrogate pair, which no file can store"):
         REFUSED[what](arm)
 
 

@@ -3,6 +3,7 @@
 A natural spline is a cubic in each piece: what it makes of one of zero curvature at both ends is that cubic, to rounding.
 """
 
+import copy
 import pickle
 
 import numpy as np
@@ -120,3 +121,14 @@ def test_of_two_coordinates():
     model.add_coupling(["hinge0"], function=pc.Spline([0, 1], [0, 1]), name="cam")
     with pytest.raises(pc.ModelError, match=r"two coordinates, \[driver, follower\], not 1"):
         model.loops.jacobian()
+
+
+@pytest.mark.parametrize("options", [{}, {"ends": "natural"}, {"ends": "clamped"}])
+def test_copies_keep_their_ends(options):
+    spline = pc.Spline([0.0, 1.0, 2.0, 4.0], [0.0, 1.0, -1.0, 2.0], **options)
+    at = np.array([0.3, 0.0])
+    for again in [
+        copy.deepcopy(spline),
+        *(pickle.loads(pickle.dumps(spline, protocol)) for protocol in range(pickle.HIGHEST_PROTOCOL + 1)),
+    ]:
+        assert again(at) == spline(at)

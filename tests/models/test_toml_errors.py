@@ -75,14 +75,14 @@ def says(tmp_path):
         (A + "limits = [-1, nan]",
          ":3: body 'a': limits = [-1, nan]; write [lower, upper], or [[lower, ...], [upper, ...]] with one of each "
          "a subhinge; -inf and inf are no limit"),
-        (A + "[state.q]\na = nan", ":4: q of the state: a = nan; write a finite number, that of the hinge's coordinate"),
+        (A + "[state.q]\na = nan", ":4: q of the state: a = nan; write a finite number, the value of the hinge's coordinate"),
         (A + 'hinge = "ball"\n[state.v]\na = [0, 0]', ":5: v of the state: a = [0, 0]; write 3 finite numbers, those of a ball hinge"),
         (A + "[left_aside]\ndamping = 1", ":4: damping in left_aside is a table, not 1"),
         # what does not go together
         ("[[bodies]]\nmass = 1", ':1: body number 1 has no name; give it one: name = "..."'),
         (A + "axis = [0, 0, 1]\naxes = [[0, 0, 1]]", ":4: body 'a': give axis or axes, not both"),
         (A + "rpy = [0, 0, 1]\nquaternion = [1, 0, 0, 0]", ":4: body 'a' has rpy and quaternion; give one of them"),
-        (A + "quaternion = [0, 0, 0, 0]", ":3: body 'a': quaternion has no length to speak of; no rotation is [1, 0, 0, 0]"),
+        (A + "quaternion = [0, 0, 0, 0]", ":3: body 'a': quaternion has zero length; the identity is [1, 0, 0, 0]"),
         (A + 'hinge = "custom"', ':3: body \'a\': a custom hinge has subhinges = [{kind = "pin", axis = [0, 0, 1]}, ...]'),
         (A + SUBHINGES + '{ axis = [0, 0, 1] },\n]', ':7: body \'a\': subhinge 1 has no kind; give it one: kind = "pin"'),
         (A + "point = [1, 0, 0]\n" + SUBHINGES + "]", ":3: body 'a' has subhinges and point; each subhinge has its own"),

@@ -393,7 +393,7 @@ CHANGES = {
         ("frames stand where they are now", "model.frame(frame).pose(q, t=t)", "model.frame(frame).pose(q)"),
     ],
     "pycraft/dynamics/hybrid.py": [
-        ("prepared calls of an edited model stay slow", "self._ready = self._made()  # of the model as it is now", "pass"),
+        ("prepared calls of an edited model stay slow", "self._ready = self._made()  # for the model as it is now", "pass"),
     ],
     "pycraft/models/structure.py": [
         ("a root moves away from what acts on it", "in scene._acting_on(set(range(free.start, free.stop)))", "in ()"),

@@ -99,7 +99,7 @@ def test_the_set_of_operators_has_them_too():
         model.soa.B("body7", relative_to="body3")
     with pytest.raises(pc.ModelError, match="one frame, not 2"):
         model.soa.Jacobian(["body7", "body3"], relative_to="body1")
-    with pytest.raises(pc.ModelError, match="has no frames: it is no multibody model"):
+    with pytest.raises(pc.ModelError, match="has no frames: it is not a complete multibody model"):
         model.soa.grouped([["body0", "body1"]]).Jacobian("body7", relative_to="body3")
     with pytest.raises(pc.EvaluationError, match="axes='bdy'"):
         model.soa.Jacobian("body7", axes="bdy")
@@ -109,7 +109,9 @@ def test_operators_know_of_no_time():
     model = every_kind(seed=6)
     model.add_frame("swing", on="body3", motion=lambda t: np.eye(4))
     model.add_frame("upon", on="swing")
-    with pytest.raises(pc.ModelError, match="frame 'swing' is moved by a function of time, and operators know of no time; ask for arrays"):
+    with pytest.raises(
+        pc.ModelError, match="frame 'swing' is moved by a function of time, and operators do not depend on time; compute arrays instead"
+    ):
         model.frame("body8").jacobian_operator(wrt="upon")
     with pytest.raises(pc.ModelError, match="'swing'"):
         model.frame("body8").jacobian_operator(axes="upon")

@@ -89,7 +89,7 @@ def test_what_cannot_be_compared():
         pc.compare(model, tree(["pin", "pin"]))
     with pytest.raises(pc.ModelError, match="compare takes a pinocchio.Model, a mujoco.MjModel, .* not ndarray"):
         pc.compare(model, np.eye(3))
-    with pytest.raises(pc.ModelError, match="compare's first model is a Multibody, not int"):
+    with pytest.raises(pc.ModelError, match="the first model of compare must be a Multibody, not int"):
         pc.compare(3, model)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from making import contents, offline
+from making import contents, layers, offline
 from making.plain_index import plain_index, title_and_sentence
 
 ROOT = Path(__file__).parents[2]
@@ -105,3 +105,13 @@ def test_the_plain_index_has_every_page_with_its_first_sentence():
     assert title_and_sentence("# A `b`\n\n```\ncode\n```\n\nSee [it](x.md), e.g. this. More.") == ("A b", "See it, e.g. this.")
     with pytest.raises(ValueError, match="without a title"):
         title_and_sentence("no title")
+
+
+@pytest.mark.parametrize("picture", layers.PICTURES)
+def test_the_pictures_of_the_layers_are_current(picture):
+    uses = layers.order(layers.PICTURES[picture])
+    drawn = (layers.FOLDER / picture).read_text(encoding="utf-8")
+    assert drawn == layers.svg(uses), "run PYTHONPATH=docs python -m making.layers"
+    assert all(f">{layers.shown(name)}</text>" in drawn for name in uses) and len(uses) > 15
+    height = layers.heights(uses)
+    assert all(height[name] > height[used] for name in uses for used in uses[name])

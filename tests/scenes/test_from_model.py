@@ -94,7 +94,7 @@ def test_an_mjcf_file(machine):
         and servo.target == pytest.approx([0, 0, 0.2])
     )
     assert offered.notes == [
-        "actuator 'curved': its force is no straight line in control, position and velocity",
+        "actuator 'curved': its force is not affine in control, position and velocity",
         "actuator 'of ball': its joint has several coordinates",
         "actuator 'lag': it has a state of its own",
         "contacts (4 geoms)",

@@ -2,9 +2,12 @@
 
 import builtins
 import csv
+import json
+import pickle
 
 import numpy as np
 import pytest
+from scipy.interpolate import PPoly
 
 import pycraft as pc
 from support.runs import CASES
@@ -196,3 +199,64 @@ def test_names_with_quotes_and_commas_are_columns_of_csv(tmp_path):
         header, *rows = csv.reader(file)
     names = [f"{what}.{model.coordinate_names[0]}" for what in ("q", "v", "vdot")]
     assert '"' in names[0] and header[:4] == ["t", *names] and {len(row) for row in rows} == {len(header)}
+
+
+def jumping():
+    """Forces that jump where a function of time has knots, and where a controller is sampled."""
+    force = PPoly(np.array([[0.0, 40.0, -10.0]]), [0.0, 0.31, 0.52, 1.0])
+    scene = pc.mechanisms.double_pendulum()
+    hinge = next(iter(scene.model.hinges))
+    return scene.add(E.TorqueSource(force, hinges=hinge), E.Sampled(lambda t, s: -3.0 * s.v, 0.17))
+
+
+BETWEEN = np.sort(np.r_[np.linspace(0, 0.9, 301), [0.3099, 0.31, 0.3101, 0.52, 0.17, 0.1699, 0.1701, 0.34]])
+
+
+@pytest.mark.parametrize("how", ["nc", "parquet", "of times asked for", "pickled"])
+def test_between_rows_at_knots_and_samples(how, tmp_path):
+    """Without its scene a run has the accelerations of each step at its ends: Hermite's polynomials are of one piece of the motion."""
+    if how == "parquet":
+        pytest.importorskip("pyarrow", reason="extra [data]")
+    scene = jumping()
+    run = scene.simulate(0.9, [0.3, 0.2], [0.0, 0.0], t_eval=[0.1, 0.9] if how == "of times asked for" else None)
+    if how == "pickled":
+        again = pickle.loads(pickle.dumps(run))
+    else:
+        file = tmp_path / f"run.{'parquet' if how == 'parquet' else 'nc'}"
+        run.save(file)
+        again = pc.load_run(file)
+    exact, found = run.at(BETWEEN), again.at(BETWEEN)
+    assert np.abs(found.q - exact.q).max() < 1e-8 and np.abs(found.v - exact.v).max() < 1e-6
+    assert np.array_equal(found.states, exact.states)
+
+
+@pytest.mark.parametrize("t_eval", [None, [0.1, 0.9]])
+def test_files_of_the_first_format(t_eval, tmp_path):
+    """They have one acceleration at each row, or none beside those of the table, and do not say what controllers hold."""
+    from scipy.io import netcdf_file
+
+    run = jumping().simulate(0.9, [0.3, 0.2], [0.0, 0.0], t_eval=t_eval)
+    run.save(tmp_path / "new.nc")
+    with (
+        netcdf_file(str(tmp_path / "new.nc"), "r", mmap=False) as new,
+        netcdf_file(str(tmp_path / "old.nc"), "w", version=2) as old,
+    ):
+        about = json.loads(new.about)
+        del about["about"]["held"]
+        old.about = json.dumps(about | {"format": "pycraft run 1"}).encode()
+        for axis, size in new.dimensions.items():
+            old.createDimension(axis, size)
+        for name, x in new.variables.items():
+            if name != "step_vdot_before" and not (t_eval is None and name.startswith("step_")):
+                old.createVariable(name, "d", x.dimensions)[:] = x[:]
+    again = pc.load_run(tmp_path / "old.nc")
+    same(run, again)
+    assert np.abs(again.at(0.4).q - run.at(0.4).q).max() < 1e-4
+    about["format"] = "pycraft run 3"
+    with netcdf_file(str(tmp_path / "newer.nc"), "w") as newer:
+        newer.about = json.dumps(about).encode()
+        newer.createDimension("time", 1)
+        newer.createVariable("time", "d", ("time",))[:] = 0.0
+        newer.createVariable("kinetic", "d", ("time",))[:] = 0.0
+    with pytest.raises(pc.EvaluationError, match="its format is 'pycraft run 3', not 'pycraft run 1' or 'pycraft run 2'"):
+        pc.load_run(tmp_path / "newer.nc")

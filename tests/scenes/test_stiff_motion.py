@@ -251,18 +251,94 @@ def slider():
     return model
 
 
+UNSTABLE = "are unstable for the scene of 'b' at t = .*, of coordinate 'b' under effect '(limits|spring|damping)'. There steps shorter than"
+
+
 @pytest.mark.parametrize(
-    "effect", [E.Limits(1e4, 0.0, -0.5, 0.5), E.Limits(1e8, 0.4, -0.5, 0.5), E.Spring(1e4)], ids=["stops", "hard", "spring"]
+    "effect, longest",
+    [(E.Limits(1e4, 0.0, -0.5, 0.5), 0.02), (E.Limits(1e8, 0.4, -0.5, 0.5), None), (E.Spring(1e4), 0.02), (E.Damping(1e3), 2e-3)],
+    ids=["stops", "hard", "spring", "damping"],
 )
-def test_an_explicit_step_beyond_its_stability(effect):
+def test_an_explicit_step_beyond_its_stability(effect, longest):
+    """Said while the run goes, once, with the step that is stable: 2/ω and 2 m/c."""
     scene = pc.Scene(slider()).add(effect)
-    with pytest.warns(
-        pc.ModelWarning, match=r"energy balance of this run changes by .* steps of 0.05 s are too long for 'semi-implicit-euler'"
-    ):
-        scene.simulate(0.6, [0.1], [1.0], integrator="semi-implicit-euler", step=0.05, **QUIET)
+    with pytest.warns(pc.ModelWarning, match=UNSTABLE) as said:
+        run = scene.simulate(0.6, [0.1], [1.0], integrator="semi-implicit-euler", step=0.05, **QUIET)
+    assert len(said) == 1 and "ImplicitSpring" in str(said[0].message) and run.statistics["stiffness"]["t"] < 0.6
+    if longest:
+        assert run.statistics["stiffness"]["longest"] == pytest.approx(longest, rel=1e-6)
     with warnings.catch_warnings():
         warnings.simplefilter("error", pc.ModelWarning)
         scene.simulate(0.5, [0.1], [1.0], integrator="semi-implicit-euler", step=1e-6, t_eval=[0.5], **QUIET)
+
+
+def test_a_contact_that_is_shorter_than_a_step():
+    """Its steps end at the stop, so that energy is kept, and last √6/ω of Runge and Kutta's polynomial, not π/ω: said in its middle."""
+    scene = pc.Scene(slider()).add(E.Limits(1e4, 0.0, -0.5, 0.5))
+    with pytest.warns(pc.ModelWarning, match=UNSTABLE) as said:
+        run = scene.simulate(2.0, [0.0], [1.0], integrator="rk4", step=0.05, **QUIET)
+    assert len(said) == 1 and run.statistics["stiffness"]["longest"] == pytest.approx(np.sqrt(8) / 100, rel=1e-6)
+    assert np.diff(run.events["limits"].t[:2])[0] == pytest.approx(np.sqrt(6) / 100, rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.98, 1.02])
+@pytest.mark.parametrize("integrator", ["semi-implicit-euler", "rk4", "rkmk4"])
+@pytest.mark.parametrize(
+    "effects",
+    [(E.Spring(300.0),), (E.Damping(30.0),), (E.Spring(200.0), E.Damping(3.0)), (E.Spring(400.0), E.ImplicitSpring(300.0)),
+     (E.Spring(300.0), E.ImplicitDamping(30.0)), (E.Damping(30.0), E.ImplicitSpring(50.0))],
+    ids=["spring", "damper", "both", "spring beside implicit", "spring beside implicit damper", "damper beside implicit"],
+)  # fmt: skip
+def test_the_bound_of_stability(effects, integrator, share):
+    """Of several bodies: eigenvalues of the linearized step, as a matrix; two hundredths on either side of the step where one reaches 1."""
+    model = pc.tree([-1, 0, 1, 1], ["pin", "slider", "pin", "pin"], seed=4)
+    rest = model.random_state(3).q
+    implicit = {type(e): e for e in effects if isinstance(e, (E.ImplicitSpring, E.ImplicitDamping))}
+    if implicit and integrator != "semi-implicit-euler":
+        pytest.skip("acts in implicit steps")
+    given = [type(e)(e.stiffness, rest=rest) if isinstance(e, (E.Spring, E.ImplicitSpring)) else e for e in effects]
+    M, n = model.mass_matrix(rest), model.nv
+
+    def of(kinds, what):
+        return sum(np.asarray(getattr(e, what), float).max() for e in effects if isinstance(e, kinds)) * np.eye(n)
+
+    k, c = of(E.Spring, "stiffness"), of(E.Damping, "coefficient")
+    ki, ci = of(E.ImplicitSpring, "stiffness"), of(E.ImplicitDamping, "coefficient")
+
+    def growth(h):
+        if integrator == "semi-implicit-euler":
+            rates = np.linalg.solve(M + h * ci + h * h * ki, np.hstack([-(k + ki), -(c + ci) - h * ki]))
+            faster = np.hstack([np.zeros((n, n)), np.eye(n)]) + h * rates
+            step = np.vstack([np.hstack([np.eye(n), np.zeros((n, n))]) + h * faster, faster])
+        else:
+            J = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, k), -np.linalg.solve(M, c)]])
+            step = sum(np.linalg.matrix_power(h * J, i) / f for i, f in enumerate((1, 1, 2, 6, 24)))
+        return np.abs(np.linalg.eigvals(step)).max()
+
+    low, high = 1e-6, 10.0
+    if growth(high) <= 1 + 1e-6:
+        pytest.skip("stable for any step")
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if growth(middle) > 1 + 1e-6 else (middle, high)
+    scene = pc.Scene(model).add(*given)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        run = scene.simulate(5 * share * low, rest, 1e-6 * np.ones(n), integrator=integrator, step=share * low, **QUIET)
+    told = [str(w.message) for w in said if "are unstable for" in str(w.message)]  # near the bound the balance is lost on both sides of it
+    assert len(told) == (share > 1)
+    if share > 1:
+        assert len(said) == 1 and "under effect" in told[0]
+        assert run.statistics["stiffness"]["longest"] == pytest.approx(low, rel=0.01)
+
+
+def test_what_grows_by_itself_is_not_unstable_steps():
+    """A pendulum upright, and one that swings: steps of a sixth of its period lose accuracy, not stability."""
+    pendulum = pc.mechanisms.pendulum()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pc.ModelWarning)
+        for integrator in ("rk4", "semi-implicit-euler"):
+            pendulum.simulate(1.0, [np.pi - 1e-3], [0.0], integrator=integrator, step=0.02, **QUIET)
 
 
 def test_a_state_that_is_not_finite_has_no_sign():

@@ -26,6 +26,23 @@ def test_the_example():
     assert len(rows) == 2 and run.v[rows].tolist() == [[0, 0], [1, 1]]
 
 
+@pytest.mark.parametrize("integrator, order", [("dopri5", 5), ("dop853", 8), ("rosenbrock4", 4)])
+def test_the_balance_beyond_a_jump_is_the_quadrature_of_works(integrator, order):
+    """No term is missing: beyond the jump q and v are straight lines, which every step follows exactly, so that no tolerance shortens one.
+    The balance falls with the longest step by the order of the method, to rounding."""
+    scene = cart(E.Table([0, 1, 2], [0, 0, 1.0]))
+    off = {
+        h: np.ptp(scene.simulate(2.0, [0, 0.0], [0, 0], integrator=integrator, max_step=h, **P).balance)
+        for h in (None, 0.25, 0.125, 0.0625, 0.004)
+    }
+    tight = scene.simulate(2.0, [0, 0.0], [0, 0], integrator=integrator, rtol=1e-12, atol=1e-15, **P)
+    assert 1e-9 < off[None] < 1e-3 and np.ptp(tight.balance) > 0.01 * off[None] or integrator == "dop853"
+    for h in (0.25, 0.125):
+        if off[h / 2] > 1e-13:
+            assert off[h] / off[h / 2] > 0.8 * 2**order
+    assert off[0.004] < (1e-14 if order > 4 else 1e-11)
+
+
 def test_the_limit_of_ramps():
     """Rates that rise within a shorter and shorter time come to it, by their length."""
     off = []

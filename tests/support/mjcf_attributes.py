@@ -139,7 +139,7 @@ NAMED = {  # what acts, and is named
     ),
     "ellipsoids in a fluid": ({"option": 'density="20"', "geom": 'fluidshape="ellipsoid"'}, "forces of the fluid on ellipsoids of 'a'"),
     "a muscle": ({"rest": actuators('<muscle joint="j" force="3" lengthrange="-1 1"/>')}, "it has a state of its own"),
-    "a damper": ({"rest": actuators('<damper joint="j" kv="2" ctrlrange="1 2"/>')}, "its force is no straight line"),
+    "a damper": ({"rest": actuators('<damper joint="j" kv="2" ctrlrange="1 2"/>')}, "its force is not affine"),
     "an asymmetric servo": (
         {"rest": actuators('<position joint="j" kp="30" forcelimited="true" forcerange="-.2 .7"/>')},
         "force range [-0.2, 0.7] of actuator 'actuator0', which is not symmetric",

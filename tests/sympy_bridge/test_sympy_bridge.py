@@ -85,7 +85,7 @@ def test_expanding_distributes_and_keeps_the_order_of_factors(arm):
 def test_zeros_and_identities_of_spaces_that_sympy_does_not_know(arm):
     phi, M = arm.soa("phi M")
     difference = to_sympy(phi) - to_sympy(phi)
-    with pytest.raises(pc.EvaluationError, match="zero, and SymPy does not say of which spaces"):
+    with pytest.raises(pc.EvaluationError, match="zero, and SymPy does not know its spaces"):
         from_sympy(difference, arm.soa)
     assert from_sympy(difference, arm.soa, like=M) == pc.zero(arm.soa.V, arm.soa.F)
     one = (to_sympy(phi) * to_sympy(phi).inverse()).doit()
@@ -150,9 +150,9 @@ def test_spaces_are_checked_on_the_way_back(arm):
         from_sympy(phi * phi.T, arm.soa)  # one dimension, two spaces
     with pytest.raises(pc.SpaceError):
         from_sympy(to_sympy(arm.soa.H) * M * to_sympy(arm.soa.H), arm.soa)
-    with pytest.raises(pc.EvaluationError, match="is no operator expression"):
+    with pytest.raises(pc.EvaluationError, match="is not an operator expression"):
         from_sympy(sympy.MatrixSymbol("A", 2, 2), arm.soa)
-    with pytest.raises(pc.EvaluationError, match="no SymPy expression"):
+    with pytest.raises(pc.EvaluationError, match="not a SymPy expression"):
         from_sympy("phi", arm.soa)
     with pytest.raises(TypeError, match="not float"):
         to_sympy(1.0)

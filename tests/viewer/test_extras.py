@@ -67,7 +67,7 @@ def test_shapes_are_triangles(view, kind, size):
         (lambda v: v.frame("f", [1, 2, np.nan]), "of finite numbers"),
         (lambda v: v.frame("f", (0, 0, 0), on="moon"), "no body or node 'moon'"),
         (lambda v: v.frame("f", (0, 0, 0), size=-1), "size is a length above zero"),
-        (lambda v: v.frame(7, (0, 0, 0)), "called by a text"),
+        (lambda v: v.frame(7, (0, 0, 0)), "named by a string"),
         (lambda v: v.label("t", (0, 0)), r"at takes finite numbers, \(3,\)"),
         (lambda v: v.line("l", [1, 2, 3]), r"points takes finite numbers, \(n, 3\)"),
         (lambda v: v.label("t", (0, 0, 0), colour="red"), "colour is '#rrggbb'"),

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "runtime/errors.h"
 #include "simulation/dense_output.h"
@@ -75,6 +76,7 @@ class Run {
     stepper_.start(t_, x_, S(times.back()), plan_.resumed ? &plan_.resumed->pace : nullptr);
     watch_.begin(t_, x_, plan_.resumed ? &plan_.resumed->signs : nullptr);
     keep();
+    left_ = kept_;  // its arrays are there when a step is cut
     while (next_ < times.size() && end_.event < 0) piece();
   }
 
@@ -132,6 +134,8 @@ class Run {
     if (stepper_.cut() && !parted_) left_ = kept_, parted_ = true;  // a longer run took other steps from there
     keep();
     whole_ = fresh_ = false;
+    if (!record().controlled && end_.cost.steps == 0) look_at_stability();
+    const bool beyond = std::exchange(met_, false);
     stepper_.advance(t_, x_);
     ++end_.cost.steps;
     if (const int method = stepper_.method(); method != method_) end_.switches.emplace_back(to_double(kept_.t), method_ = method);
@@ -143,10 +147,28 @@ class Run {
     if (options_.normalise || equations_.settles()) stepper_.forget();
     watcher_.step(t_, x_);
     tell_progress();
-    if (!stiff_ && stepper_.held() >= lasting) {
-      stiff_ = watcher_.stiff(t_, x_, stepper_.pace().size, S(plan_.times.back()));
-      if (!stiff_) stepper_.doubt();
+    if (record().controlled) {
+      if (!stiff_ && stepper_.held() >= lasting) look_at_stability();
+    } else if (beyond && ++looks_ <= enough) {
+      look_beyond();
+    } else if (end_.cost.steps == next_look_) {
+      look_at_stability();
     }
+  }
+  // At the end of the step that began at a stop, or, where it ended at one, in its middle: what came and went in one step is felt there alone.
+  void look_beyond() {
+    if (!met_) return look_at_stability();
+    if (stiff_) return;
+    const S middle = (kept_.t + t_) / S(2);
+    stepper_.within(kept_.t, kept_.x, middle, sampled_);
+    finish(middle, sampled_);
+    stiff_ = watcher_.stiff(middle, sampled_, stepper_.pace().size, S(plan_.times.back()));
+  }
+  void look_at_stability() {
+    if (end_.cost.steps == next_look_) next_look_ *= 4;
+    if (stiff_) return;
+    stiff_ = watcher_.stiff(t_, x_, stepper_.pace().size, S(plan_.times.back()));
+    if (!stiff_) stepper_.doubt();
   }
   void finish(const S& t, State& x) {
     equations_.settle(t, x);
@@ -178,6 +200,7 @@ class Run {
       if (!kind.terminal && !kind.ends_step) continue;
       sample_to(c.t, x_);
       t_ = c.t, x_ = c.x;
+      met_ = kind.ends_step;
       begin_anew();
       if (kind.terminal)
         end_.event = c.event;
@@ -216,6 +239,8 @@ class Run {
 
   // Steps at the bound of stability after which a motion is no passing stiffness, and a word is due.
   static constexpr int lasting = 1000;
+  // Of steps of one size: stops beyond which stability is looked at, and the first of the steps after which it is, each four times the last.
+  static constexpr int enough = 8, first_look = 1024;
   // Where the last step began.
   void keep() { kept_.t = t_, kept_.x = x_, kept_.pace = stepper_.pace(), kept_.signs = watch_.signs(); }
   // A run that goes on takes the step again that the end of this one cut short, so that its steps are those of one that never ended.
@@ -243,8 +268,9 @@ class Run {
   S t_, to_ = S(0);
   double stop_ = std::numeric_limits<double>::infinity();  // the next one
   size_t next_ = 1;
-  int method_ = 0;
-  bool at_times_, forwards_ = true, stiff_ = false, parted_ = false;
+  int method_ = 0, looks_ = 0;
+  long next_look_ = first_look;
+  bool at_times_, forwards_ = true, stiff_ = false, parted_ = false, met_ = false;  // met_: the last step ended at a stop
   bool whole_ = false, fresh_ = false;  // where the run stands: a step had to end there; and what follows is counted anew
   std::chrono::steady_clock::time_point told_ = std::chrono::steady_clock::now();
 };

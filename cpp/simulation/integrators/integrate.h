@@ -31,7 +31,8 @@ class Watcher {
   virtual void sample(const S&, const State&) {}       // the times asked for, in order
   virtual void event(int, const S&, const State&) {}
   virtual void progress(double) {}                     // some ten times a second
-  // Steps of this size seem to be held by stability, at this state, in a run that ends at `last`. Whether that is so: then it is not asked again.
+  // Steps of this size seem to be held by stability, at this state, in a run that ends at `last`; or are all of one size, at the start, beyond stops that
+  // were met, and now and then. Whether they are held, or unstable: then it is not asked again.
   virtual bool stiff(const S& /* t */, const State& /* x */, const S& /* step */, const S& /* last */) { return false; }
 };
 

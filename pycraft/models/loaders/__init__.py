@@ -1,4 +1,4 @@
-"""Models from files: URDF and MJCF."""
+"""Models from files: TOML, URDF, SDF and MJCF."""
 
 from .load import load, read
 

@@ -1,4 +1,4 @@
-"""The bytes of a model's file, whatever its format."""
+"""The bytes of a model's file in any format."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ... import _core
 
 
 def contents(path: str | os.PathLike[str]) -> tuple[str, bytes]:
-    """The path as errors show it, and what is in the file. ModelError where it cannot be read, or is no path."""
+    """Return the path as errors show it, and the contents of the file. ModelError if it cannot be read, or is not a path."""
     try:
         shown = os.fsdecode(path)
     except TypeError:

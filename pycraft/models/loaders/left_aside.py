@@ -1,4 +1,4 @@
-"""What a file says and a model does not have: gathered by coordinate, reported once, kept as numbers."""
+"""Data of a file that are not part of the model: gathered by coordinate, reported once, stored as values."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from ..multibody import Multibody
 
 OFF = "the file disables it"
-"""Why an actuator is no effect that gives no force in its own program either."""
+"""The reason for an actuator that gives no force in its own program either."""
 _SHOWN = 12
-"""How many things that are not read a warning names."""
+"""Number of unread items that a warning names."""
 QUANTITIES = ("damping", "quadratic damping", "friction", "stiffness", "effort limit", "velocity limit")
-"""What of a coordinate there is to leave aside; beside them "gravity", and "spring rest" by the coordinates q."""
+"""Quantities by coordinate; further ones are "gravity", and "spring rest" by the coordinates q."""
 
 
 def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]) -> dict[str, np.ndarray]:
-    """Arrays (nv,) from numbers by quantity and hinge; NaN where the file has none of that quantity.
+    """Return arrays (nv,) from values by quantity and hinge; NaN where the file has none of that quantity.
 
-    A hinge that the model does not have (it was welded) is passed over, and so is a quantity that is left on none.
+    Hinges that the model does not have (they were welded) are skipped, and quantities that then remain on no hinge.
     """
     if not of_hinges:
         return {}
@@ -38,7 +38,7 @@ def by_coordinate(model: Multibody, of_hinges: Mapping[str, Mapping[str, float]]
 
 
 def current(model: Multibody) -> dict[str, np.ndarray]:
-    """What of `left_aside` belongs to the coordinates that the model has now. Warns of the rest: the model was edited since."""
+    """Return the part of `left_aside` for the model's present coordinates. Warns of the rest: the model was edited since."""
     left = model.left_aside
     sizes = {"gravity": 3, "spring rest": model.nq}
     stale = [quantity for quantity, values in left.items() if len(values) != sizes.get(quantity, model.nv)]
@@ -49,7 +49,7 @@ def current(model: Multibody) -> dict[str, np.ndarray]:
 
 
 def current_actuators(model: Multibody) -> list[dict[str, Any]]:
-    """The actuators whose coordinates the model still has. Warns of the others, as `current` does."""
+    """Return the actuators at coordinates that the model still has. Warns of the others, as `current` does."""
     names = {None, *model.coordinate_names}
     gone = [actuator["name"] for actuator in model.actuators if actuator["coordinate"] not in names]
     if gone:
@@ -66,11 +66,11 @@ _NAMES = {
     "effort limit": "effort limits",
     "velocity limit": "velocity limits",
 }
-"""What warnings call the quantities."""
+"""Names of the quantities in warnings."""
 
 
 def told(left: Mapping[str, np.ndarray], model: Multibody) -> str:
-    """Return what `load` says of a file: what effects are made of, the gravity, and what is not read; empty where there is nothing."""
+    """Return the warnings of `load` for a file: data for effects, the gravity, and unread elements; empty if there are none."""
     parts, said = [], []
     for quantity, values in left.items():
         if quantity in _NAMES:

@@ -1,4 +1,4 @@
-"""Models from files: `load` looks into the file and hands it to the reader of its format."""
+"""Models from files: `load` detects the format of a file and calls its reader."""
 
 from __future__ import annotations
 
@@ -34,47 +34,48 @@ def load(
 ) -> Multibody:
     """Load the model of a TOML, URDF, SDF or MJCF file, or a robot by its name.
 
-    The root element of an XML file says its format. A TOML file holds a model as `Multibody.save` wrote it, gravity and state with it.
-    From the others hinges take the file's joint names, bodies its link names, and the model the robot's name. Children come in the order
-    of their joint elements, depth first. Gravity is zero until it is set, even where the file gives it. Damping, friction, springs,
-    actuators and bounds on efforts and velocities are effects: a warning names those of the file, and `pycraft.effects.from_model` makes
-    effects of them. `Multibody.not_read` names what changes motions elsewhere and is not read, such as contacts.
+    The root element of an XML file determines its format. A TOML file holds a model as `Multibody.save` wrote it, including gravity and
+    state. From the other formats hinges take the file's joint names, bodies its link names, and the model the robot's name. Children are in
+    the order of their joint elements, depth first. Gravity is zero until it is set, even if the file gives it. Damping, friction, springs,
+    actuators and bounds on efforts and velocities are effects: a warning names the file's, and `pycraft.effects.from_model` makes
+    effects of them. `Multibody.not_read` names elements that change motions elsewhere and are not read, such as contacts.
 
     Parameters
     ----------
     path : path of the file, or name of a robot
-        A file whose name ends in ".toml" is read as TOML. A name is one of `pycraft.robots.names()`, the name of a file of the installed
+        A file name that ends in ".toml" is read as TOML. A name is one of `pycraft.robots.names()`, the name of a file of the installed
         example-robot-data ("anymal"), or a module of the installed robot_descriptions ("ur5_description").
     root : {"fixed", "free"}
-        What carries the root link of a URDF or SDF file: the base, or a free hinge called "root" whose body has the root link's name.
-        Without it the root is fixed, except that of a package robot that flies, and a warning tells of a root link with mass. A link of no
-        mass with a floating joint called "root" is free already. MJCF and TOML files say so themselves; for them there is only "fixed".
+        The carrier of the root link of a URDF or SDF file: the base, or a free hinge called "root" with a body that has the root link's
+        name. By default the root is fixed, except for a package robot that flies, and a warning reports a root link with mass. A massless
+        link with a floating joint called "root" is free already. MJCF and TOML files specify this themselves; for them the only value is
+        "fixed".
     mimic : {"couple", "refuse", "lock", "free"}
-        A joint that follows another becomes a joint of its own with a coupling in `Multibody.loops` that has the joint's name; an error; a
-        weld at the position that it has when the other joint is at zero; a joint that moves on its own.
+        A joint that follows another becomes: a joint of its own with a coupling in `Multibody.loops` of the same name; an error; a weld at
+        its position with the other joint at zero; an independent joint.
     welds : {"lump", "keep"}
         "lump": a link on a fixed joint becomes part of the body that moves it, and a node with its name (a fixed root link becomes a node
-        of the base). "keep": it stays a body without coordinates. Both give the same mass matrix. By default what a TOML file says, "lump"
+        of the base). "keep": it stays a body without coordinates. Both give the same mass matrix. Default: as a TOML file specifies, "lump"
         for the others.
     package_dirs : folders
-        Where packages of "package://" names lie. Loading a URDF file opens no mesh; viewers look for those of `Multibody.shapes` there: see
-        `pycraft.models.loaders.urdf.resolve_package`.
+        Locations of packages of "package://" names. Loading a URDF file opens no mesh; viewers look for the meshes of `Multibody.shapes`
+        there: see `pycraft.models.loaders.urdf.resolve_package`.
     strict : bool
-        Makes an inertia that violates the triangle inequality an error instead of a warning.
+        Raise an error instead of a warning for an inertia that violates the triangle inequality.
     gravity : (3,) m/s², or "file"
-        The model's gravity; "file" takes what an MJCF or SDF file says. By default what a TOML file says, zero for the others.
+        The model's gravity; "file" uses the gravity of an MJCF or SDF file. Default: the gravity of a TOML file, zero for the others.
 
     Warns
     -----
     ModelWarning
         Once each, with file and line: inertias that violate the triangle inequality, massless bodies on hinges, limits in the wrong order,
-        what the reader overlooks in the file. Once for a file: a root link with mass that is fixed, what is not in the model, what is not
-        read.
+        elements that the reader ignores. Once for a file: a fixed root link with mass, data that are not part of the model, elements that
+        are not read.
 
     Raises
     ------
     ModelError
-        Whatever the file gets wrong, with file, line, element or key, and remedy; in an MJCF file what MuJoCo refuses; an unknown name.
+        Any fault of the file, with file, line, element or key, and remedy; in an MJCF file anything that MuJoCo refuses; an unknown name.
     MissingPackageError
         An MJCF file without the package mujoco (extra `mjcf`).
 
@@ -122,7 +123,7 @@ def _set_gravity(model: Multibody, gravity: str | Sequence[float] | None, file: 
         if "gravity" not in model.left_aside and getattr(file, "root_name", "robot") == "robot":
             text = "gravity='file', and the file gives none, as no URDF file does; give three numbers in m/s²"
             raise _core.ModelError(f"{file.path}: {text}")
-        model.gravity = model._left_aside.pop("gravity", np.zeros(3))  # none where the file disables it
+        model.gravity = model._left_aside.pop("gravity", np.zeros(3))  # none if the file disables it
     elif gravity is not None:
         model.gravity = gravity
         model._left_aside.pop("gravity", None)
@@ -137,7 +138,7 @@ def read(
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     strict: bool = False,
 ) -> tuple[Multibody, list[str]]:
-    """Return the model of a file and what `load` warns of, for callers that know the file and decide themselves what to report."""
+    """Return the model of a file and the warnings of `load`, for callers that decide themselves what to report."""
     _check_options(root, mimic, welds)
     return _read(_opened(path), root, mimic, welds, strict, package_dirs)
 
@@ -154,13 +155,13 @@ def _opened(path: str | os.PathLike[str]) -> TomlFile | XmlFile:
 
 
 def is_toml(path: object) -> bool:
-    """Whether a path is that of a TOML file: by how its name ends."""
+    """Check by its ending that a path is that of a TOML file."""
     return isinstance(path, (str, bytes, os.PathLike)) and os.fsdecode(path).lower().endswith(".toml")
 
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """No search for garbage meanwhile: a file of 10⁵ links makes objects by the million, all of which are in use."""
+    """Suspend garbage collection: a file of 10⁵ links creates objects by the million, all of them in use."""
     searched = gc.isenabled()
     gc.disable()
     try:
@@ -178,7 +179,7 @@ def _read(
     strict: bool,
     package_dirs: Sequence[str | os.PathLike[str]],
 ) -> tuple[Multibody, list[str]]:
-    with _no_collection(), np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused, with its line
+    with _no_collection(), np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused, with their line
         if isinstance(file, TomlFile):
             return toml_reader.read(file, root=root or "fixed", welds=welds, strict=strict)
         try:

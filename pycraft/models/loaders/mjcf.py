@@ -1,4 +1,4 @@
-"""MJCF files read into a `Multibody` through the mujoco package (extra `mjcf`), whose compiler settles frames and inertias.
+"""Read MJCF files into a `Multibody` through the mujoco package (extra `mjcf`), whose compiler resolves frames and inertias.
 
 joint type        hinge     coordinates
 hinge             pin       angle about the axis through the joint's pos
@@ -8,17 +8,16 @@ free              free      quaternion, position of the body in the world, which
 several           custom    those of its joints, in their order
 none              weld      none
 
-Names. Bodies have the file's names ("body3", by MuJoCo's number, without one). A hinge has its joint's name, or its body's
-name where the joint has none or there are several (the first joint's where some joint is called like the body). Several that
-are called name[0], name[1], ... are the hinge "name". A site with a name is a node, with "_site" added where a body has its
-name already.
+Names. Bodies have the file's names ("body3", by MuJoCo's number, without one). A hinge has its joint's name, or its body's name if the
+joint has none or there are several (the first joint's if some joint has the body's name). Joints called name[0], name[1], ... form the
+hinge "name". A site with a name is a node, with "_site" added if a body has its name already.
 
-Coordinates are MuJoCo's numbers: a joint's `ref` goes into the placement of its hinge, and the model's state is MuJoCo's qpos0,
-or the keyframe called "state" where there is one. A limit that is the largest double is none.
-`pycraft.interop.mujoco` has the order and the velocities of free hinges. `armature` is the rotor inertia.
+Coordinates are MuJoCo's values: a joint's `ref` goes into the placement of its hinge, and the model's state is MuJoCo's qpos0, or the
+keyframe called "state" if there is one. A limit at the largest double means no limit. `pycraft.interop.mujoco` has the order and the
+velocities of free hinges. `armature` is the rotor inertia.
 
-What is not in the model as it is an effect, and what is not read at all: `mjcf_effects`. Equality constraints connect, weld and joint are
-in `Multibody.loops`, with a warning, as dynamics of the tree does not keep them.
+Elements that become effects, and elements that are not read: see `mjcf_effects`. Equality constraints connect, weld and joint are in
+`Multibody.loops`, with a warning, as dynamics of the tree does not keep them.
 """
 
 from __future__ import annotations
@@ -49,14 +48,14 @@ _V_SIZE = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
 
 
 def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibody, list[str]]:
-    """The model of an MJCF file, and what is worth a warning about it. Parameters are those of `pycraft.load`.
+    """Return the model of an MJCF file, and its warnings. Parameters as in `pycraft.load`.
 
     Raises
     ------
     MissingPackageError
         The mujoco package is not installed: names the extra.
     ModelError
-        What MuJoCo refuses, in its words; root="free", which an MJCF file says itself by a freejoint.
+        Anything that MuJoCo refuses, in its words; root="free", which an MJCF file specifies by a freejoint.
     """
     if root == "free":
         raise file.error(file.root, 'root="free" is for URDF files; in an MJCF file give the body a <freejoint name="root"/>')
@@ -65,7 +64,7 @@ def read(file: XmlFile, *, root: str, welds: str, strict: bool) -> tuple[Multibo
         compiled = conventions.compiled(file.path, lambda spec: missing.extend(without_missing_files(spec, file.path)))
         model, words = _Reader(compiled, file.root.get("model") or Path(file.path).stem, file.path).model(welds, strict)
         return model, [*words, *([f"{file.path}: files that are not there, and left out: {abbreviated(missing)}"] if missing else [])]
-    except UnicodeDecodeError as error:  # MuJoCo hands names on as bytes
+    except UnicodeDecodeError as error:  # MuJoCo passes names as bytes
         text = f"a name is not in UTF-8 ({error.reason}), which is how MuJoCo reads files whatever they declare; convert the file"
         raise file.error(file.root, text) from None
 
@@ -118,7 +117,7 @@ class _Reader:
         return model, self.warnings + [f"{self.path}: {text}" for _, text in model.take_warnings()]
 
     def _state(self, model: Multibody) -> tuple[np.ndarray, np.ndarray]:
-        """The keyframe "state", which `Multibody.save` writes; else qpos0, at rest."""
+        """Return the keyframe "state", which `Multibody.save` writes; else qpos0, at rest."""
         for k in range(self.m.nkey):
             if self.m.key(k).name == STATE:
                 return conventions.from_mujoco(model, self.m.key_qpos[k], self.m.key_qvel[k])
@@ -153,13 +152,13 @@ class _Reader:
         return body if body not in taken else first or _unused(f"{body}_joint", taken)
 
     def _common_name(self, joints: range) -> str:
-        """The name of joints that are called name[0], name[1], ..., as `Multibody.save` calls those of one hinge; else empty."""
+        """Return the name of joints that are called name[0], name[1], ..., as `Multibody.save` writes those of one hinge; else empty."""
         names = [self.m.joint(j).name for j in joints]
         common = names[0].removesuffix("[0]")
         return common if names == [f"{common}[{i}]" for i in range(len(names))] else ""
 
     def _hinge(self, b: int) -> dict[str, Any]:
-        """How the body moves, as `Multibody.add_body` takes it."""
+        """Return the arguments of `Multibody.add_body` for the body's hinge."""
         m, joints = self.m, self._joints(b)
         placement = np.eye(4)
         placement[:3, :3], placement[:3, 3] = rotation_from_quaternion(m.body_quat[b]), m.body_pos[b]
@@ -198,11 +197,11 @@ class _Reader:
         return options
 
     def _absorb_references(self, placement: np.ndarray, joints: range) -> tuple[np.ndarray, list[dict[str, Any]]]:
-        """Subhinges that are at MuJoCo's joint angles, and the placement with what their `ref` leaves.
+        """Return subhinges with MuJoCo's joint angles, and the placement with the remainder of their `ref`.
 
-        A joint's step is s(q − ref) = s(−ref) s(q). The constant steps are handed to the left, s(q) C = C (C⁻¹ s(q) C), into the
-        placement: a step that is passed gets its axis and point from C⁻¹. A ball joint keeps its quaternion: MuJoCo allows no
-        rotation after it, so that C is a translation there.
+        A joint's step is s(q − ref) = s(−ref) s(q). The constant steps are moved to the left, s(q) C = C (C⁻¹ s(q) C), into the placement:
+        a step that is passed gets its axis and point from C⁻¹. A ball joint keeps its quaternion: MuJoCo allows no rotation after it, so
+        that C is a translation there.
         """
         C = np.eye(4)
         subhinges: list[dict[str, Any]] = []
@@ -220,9 +219,9 @@ class _Reader:
                 C = _pose(np.eye(3), -reference * axis) @ C
         return placement @ C if not np.array_equal(C, np.eye(4)) else placement, subhinges
 
-    # ------------------------------------------------------------------ what direct calls do not keep
+    # ------------------------------------------------------------------ constraints that direct calls do not keep
     def _equalities(self, model: Multibody) -> list[str]:
-        """Declare equality constraints as loops, and return those that are none."""
+        """Declare equality constraints as loops, and return those that cannot be."""
         left_out, inactive = add_equalities(self.m, model, self.bodies)
         if len(model.loops):
             names = ", ".join(map(repr, model.loops))

@@ -1,4 +1,4 @@
-"""Actuators of an MJCF file as numbers: what a straight line from control and joint to force is made of."""
+"""Actuators of an MJCF file: the coefficients of an affine law from control and joint to force."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HINGE, _SLIDE = 3, 2  # mjtJoint
 
 
 def read_actuators(m: Any, model: Multibody) -> list[dict[str, Any]]:
-    """Return the actuators of MuJoCo's compiled model, as `Multibody.actuators` has them, with the coordinates of ours."""
+    """Return the actuators of MuJoCo's compiled model, in the form of `Multibody.actuators`, with our coordinates."""
     if not (count := count_of_actuators(m)):
         return []
     names = [model.coordinate_names[j] for j in permutation(model)[1]]  # in MuJoCo's order
@@ -48,7 +48,7 @@ def _actuator(m: Any, a: int, names: list[str], shared: set[int]) -> dict[str, A
 
 
 def _control(m: Any, a: int) -> float:
-    """Return the control that MuJoCo takes for zero: the one of its range that is nearest to it."""
+    """Return the control that MuJoCo uses for zero: the nearest one in its range."""
     first = int(m.actuator_ctrladr[a]) if hasattr(m, "actuator_ctrladr") else a
     if first < 0 or first >= len(m.actuator_ctrllimited) or not m.actuator_ctrllimited[first] or disabled(m, "clampctrl"):
         return 0.0
@@ -56,7 +56,7 @@ def _control(m: Any, a: int) -> float:
 
 
 def _force_range(m: Any, a: int, joint: int | None, gear: float) -> list[float]:
-    """Return the bounds of the force before the gear, with those that the joint sets for its actuator."""
+    """Return the bounds of the force before the gear, including the joint's bounds for its actuator."""
     own = np.array(m.actuator_forcerange[a]) if m.actuator_forcelimited[a] else np.array([-np.inf, np.inf])
     if joint is not None and gear and getattr(m, "jnt_actfrclimited", np.zeros(m.njnt))[joint]:
         own = np.clip(own, *sorted(m.jnt_actfrcrange[joint] / gear))
@@ -64,7 +64,7 @@ def _force_range(m: Any, a: int, joint: int | None, gear: float) -> list[float]:
 
 
 def _why_not(m: Any, a: int, joint: int, on_joint: bool) -> str | None:
-    """Return why no effect is this actuator, None where one is."""
+    """Return why no effect represents this actuator, None if one does."""
     disabled_groups, group = int(getattr(m.opt, "disableactuator", 0)), int(m.actuator_group[a])
     if disabled(m, "actuation") or (0 <= group <= 30 and disabled_groups >> group & 1):
         return OFF
@@ -79,5 +79,5 @@ def _why_not(m: Any, a: int, joint: int, on_joint: bool) -> str | None:
     if getattr(m, "actuator_delay", np.zeros(a + 1))[a] > 0:
         return "its control is delayed"
     if int(m.actuator_gaintype[a]) != _FIXED or int(m.actuator_biastype[a]) not in (_NO_BIAS, _AFFINE):
-        return "its force is no straight line in control, position and velocity"
+        return "its force is not affine in control, position and velocity"
     return None

@@ -1,4 +1,4 @@
-"""What of an MJCF file moves bodies and is not in a model: numbers for effects, and the names of what is not read.
+"""Elements of an MJCF file that move bodies and are not in a model: parameters of effects, and the names of elements that are not read.
 
 Every option, flag and attribute of MuJoCo that changes accelerations is in one of these places (tests/models/test_mjcf_differences.py has
 the list of fields and compares accelerations):
@@ -13,7 +13,7 @@ the list of fields and compares accelerations):
 | contacts, limits, tendons, flexes, plugins, ellipsoids in fluids, other polynomials, plastic springs, mocap bodies | `Multibody.not_read`
 |
 
-A flag that disables one of them leaves it out everywhere.
+A flag that disables one of them omits it everywhere.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ from .rotations import rotation_from_quaternion
 _HINGE, _SLIDE, _JOINTS = 3, 2, (0, 1)  # mjtJoint; mjtTrn of joints
 _SLEEP = 1 << 4  # mjtEnableBit, since MuJoCo 3.4
 _LISTED = 8
-"""Names of one kind that a text lists."""
+"""Number of names of one kind that a text lists."""
 
 
 def no_passive_forces(m: Any) -> bool:
-    """Return whether MuJoCo leaves out all passive forces, which it does where springs and dampers are both disabled."""
+    """Return whether MuJoCo omits all passive forces, which it does if springs and dampers are both disabled."""
     return disabled(m, "spring") and disabled(m, "damper")
 
 
 def gravity(m: Any) -> np.ndarray:
-    """Return the gravity (3,) that acts, m/s²."""
+    """Return the effective gravity (3,), m/s²."""
     return np.zeros(3) if disabled(m, "gravity") else np.array(m.opt.gravity)
 
 
 def of_actuators(m: Any, quantity: str) -> np.ndarray:
-    """Return what actuators add to the armature or damping of coordinates (nv,), in MuJoCo's order: gear² times their own."""
+    """Return the actuators' part of the armature or damping of coordinates (nv,), in MuJoCo's order: gear² times their own."""
     added = np.zeros(m.nv)
     own = np.asarray(getattr(m, f"actuator_{quantity}", np.zeros(0)))  # since MuJoCo 3.5
     for a in np.flatnonzero(own):
@@ -66,7 +66,7 @@ def armature(m: Any) -> np.ndarray:
 
 
 def by_coordinate(m: Any, model: Any) -> dict[str, np.ndarray]:
-    """Return gravity, and by coordinate damping, friction and stiffness, as far as they act: see `Multibody.left_aside`."""
+    """Return the effective gravity, and by coordinate damping, friction and stiffness: see `Multibody.left_aside`."""
     left: dict[str, np.ndarray] = {}
     if np.any(acting := gravity(m)):
         left["gravity"] = acting
@@ -89,7 +89,7 @@ def by_coordinate(m: Any, model: Any) -> dict[str, np.ndarray]:
 
 
 def _polynomial(m: Any, name: str) -> np.ndarray:
-    """Return the coefficients above the linear one, zeros where this MuJoCo has none."""
+    """Return the coefficients above the linear one, zeros if this MuJoCo version has none."""
     of = getattr(m, f"{name}poly", None)  # since MuJoCo 3.6
     return np.zeros((len(getattr(m, name)), 2)) if of is None else np.asarray(of)
 
@@ -98,7 +98,7 @@ def _polynomial(m: Any, name: str) -> np.ndarray:
 
 
 def offers(m: Any, bodies: list[str]) -> list[Offer]:
-    """Return the weights that are held and the boxes in a fluid, body by body; `bodies` are the names by MuJoCo's numbers."""
+    """Return the compensated weights and the boxes in a fluid, body by body; `bodies` are the names by MuJoCo's numbers."""
     if no_passive_forces(m):
         return []
     return [*_held(m, bodies), *_in_fluid(m, bodies)]
@@ -113,13 +113,13 @@ def _held(m: Any, bodies: list[str]) -> list[HeldWeight]:
 
 
 def _compensation_needs_actuators(m: Any) -> bool:
-    """Return whether compensation goes through actuators that are not there or do not act: then MuJoCo leaves it out."""
+    """Return whether compensation needs actuators that are missing or disabled: then MuJoCo omits it."""
     through = getattr(m, "jnt_actgravcomp", np.zeros(0))
     return bool(np.any(through)) and (m.nu == 0 or disabled(m, "actuation"))
 
 
 def _in_fluid(m: Any, bodies: list[str]) -> list[BoxInFluid]:
-    """Return the equivalent box of each body that has no geom which the fluid resists as an ellipsoid."""
+    """Return the equivalent box of each body without a geom that the fluid resists as an ellipsoid."""
     if not (m.opt.density or m.opt.viscosity):
         return []
     fluid = float(m.opt.density), float(m.opt.viscosity), tuple(map(float, m.opt.wind))
@@ -148,7 +148,7 @@ def _ellipsoids(m: Any) -> set[int]:
 
 
 def not_read(m: Any, bodies: list[str]) -> list[str]:
-    """Return, each in words, what changes motions in MuJoCo and is neither in the model nor an effect that is offered."""
+    """Return, each in words, elements that change motions in MuJoCo and are neither in the model nor available as effects."""
     found = [*_tendons(m), *(f"flex {m.flex(f).name or f!r}" for f in range(m.nflex)), *_of_joints(m), *_of_bodies(m, bodies)]
     return found + _contacts(m)
 
@@ -209,7 +209,7 @@ def _limits(m: Any) -> list[str]:
 
 
 def totals_of_several(m: Any) -> list[int]:
-    """Return the joints whose actuators' total force is limited, and which several actuators share."""
+    """Return the joints with a limited total actuator force that several actuators share."""
     if disabled(m, "actuation") or not hasattr(m, "jnt_actfrclimited"):
         return []
     ends = [int(m.actuator_trnid[a, 0]) for a in range(count_of_actuators(m)) if int(m.actuator_trntype[a]) in _JOINTS]
@@ -217,14 +217,14 @@ def totals_of_several(m: Any) -> list[int]:
 
 
 def count_of_actuators(m: Any) -> int:
-    """Return the number of actuators, which is that of the controls before MuJoCo 4."""
+    """Return the number of actuators, which before MuJoCo 4 is the number of controls."""
     return int(getattr(m, "nactuator", m.nu))
 
 
 def _of_bodies(m: Any, bodies: list[str]) -> list[str]:
     found = []
     if mocap := [bodies[b] for b in range(m.nbody) if m.body_mocapid[b] >= 0]:
-        found.append(f"motions of mocap bodies, which stand still: {listed(mocap)}")
+        found.append(f"motions of mocap bodies, which are fixed here: {listed(mocap)}")
     if (m.opt.density or m.opt.viscosity) and not no_passive_forces(m) and (there := _ellipsoids(m)):
         found.append(f"forces of the fluid on ellipsoids of {listed([bodies[b] for b in sorted(there)])}")
     if plugins := [bodies[b] for b in range(m.nbody) if m.body_plugin[b] >= 0]:
@@ -237,7 +237,7 @@ def _of_bodies(m: Any, bodies: list[str]) -> list[str]:
 
 
 def _contacts(m: Any) -> list[str]:
-    """Contacts, where two geoms on different bodies, one of which moves, may touch."""
+    """Return contacts, if two geoms on different bodies, one of which moves, may touch."""
     if disabled(m, "contact") or disabled(m, "constraint") or not m.ngeom:
         return []
     on = m.body_weldid[m.geom_bodyid]

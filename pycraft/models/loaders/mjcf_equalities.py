@@ -1,11 +1,11 @@
 """Equality constraints of an MJCF file as loops of the model (docs/loops.md): connect, weld and joint.
 
 equality   loop
-connect    a ball at the anchor, or where both sites are
-weld       a weld at the file's relative pose, or that of both sites in each other; a ball at its anchor where torquescale is 0
+connect    a ball at the anchor, or at both sites
+weld       a weld at the file's relative pose, or the relative pose of both sites; a ball at its anchor if torquescale is 0
 joint      a coupling: q₁ - ref₁ = Σ a_k (q₂ - ref₂)^k; of one joint q₁ - ref₁ = a₀
 
-Those that are not active when MuJoCo starts or that a flag disables, and equalities of tendons and flexes, are left out.
+Those that are not active when MuJoCo starts or that a flag disables, and equalities of tendons and flexes, are omitted.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _SITE = 6  # mjtObj
 
 
 def add_equalities(m: Any, model: Multibody, bodies: list[str]) -> tuple[list[str], list[str]]:
-    """Declare the equality constraints that a model can have as loops; return the others, and those that are not active.
+    """Declare the equality constraints that a model can have as loops; return the others, and the inactive ones.
 
     Both by kind, name and objects. `bodies`: names by MuJoCo's number.
     """
@@ -51,7 +51,7 @@ def add_equalities(m: Any, model: Multibody, bodies: list[str]) -> tuple[list[st
 
 
 def _unused(called: str, model: Multibody) -> str:
-    """It, or with a number where a loop has it: a hinge is two connects of one pair."""
+    """Return the name, with a number added if a loop has it: a hinge is two connects of one pair."""
     name, count = called, 1
     while name in model.loops:
         count += 1
@@ -63,7 +63,7 @@ def _add_pair(m: Any, e: int, model: Multibody, bodies: list[str], name: str) ->
     first, second = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
     weld = int(m.eq_type[e]) == _WELD
     data = m.eq_data[e]
-    # Of a on the first body, b on the second: the ends' poses there, which fall together.
+    # With a on the first body, b on the second: the poses of the ends there, which coincide.
     a, b = np.eye(4), np.eye(4)
     if int(m.eq_objtype[e]) == _SITE:
         for X, site in ((a, first), (b, second)):

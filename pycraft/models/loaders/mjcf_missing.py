@@ -1,4 +1,4 @@
-"""Files that an MJCF file names and that are not there: what is only seen or touched is left out, what gives a body its mass is not."""
+"""Missing files of an MJCF file: those for display or contact are omitted, those that determine a body's mass are an error."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from ... import _core
 
 
 def without_missing_files(spec: Any, path: str) -> list[str]:
-    """Take meshes, height fields and textures whose files are missing out of an `MjSpec`, as far as no inertia depends on them.
+    """Remove meshes, height fields and textures with missing files from an `MjSpec`, if no inertia depends on them.
 
-    A geom of a body with an `<inertial>`, or of the world, goes along with its mesh. Returns what is left out, each in words. ModelError
-    for a mesh that is not there and gives a body its mass.
+    A geom of a body with an `<inertial>`, or of the world, is removed with its mesh. Returns the removed items, each in words. ModelError
+    for a missing mesh that determines a body's mass.
     """
     folder = Path(path).parent
     meshes = {mesh.name or Path(mesh.file).stem: mesh for mesh in spec.meshes if _missing(mesh.file, spec.meshdir, folder)}

@@ -1,6 +1,6 @@
 """The geoms of a compiled MJCF file as shapes, with the triangles of their meshes.
 
-Geoms of the groups 0 to 2, which MuJoCo's viewer shows at first, are seen; those that collide are collision shapes. Many are both.
+Geoms of the groups 0 to 2, which MuJoCo's viewer shows by default, are visible; those that collide are collision shapes. Many are both.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import numpy as np
 from ..shapes import Shape, hex_colour
 from .rotations import rotation_from_quaternion
 
-_NO_COLOUR = (0.5, 0.5, 0.5, 1.0)  # what MuJoCo gives a geom that says none
+_NO_COLOUR = (0.5, 0.5, 0.5, 1.0)  # MuJoCo's default colour of a geom
 _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(2, 8)  # mjtGeom; planes and height fields, 0 and 1, are no bodies' shapes
 _SHOWN_GROUPS = 3
 
 
 def shapes_of(m: Any, bodies: list[str]) -> list[Shape]:
-    """All shapes; `bodies` are the names by MuJoCo's numbers, of which 0 is the world."""
+    """Return all shapes; `bodies` are the names by MuJoCo's numbers, where 0 is the world."""
     made = []
     for g in range(m.ngeom):
         kind, size, on = int(m.geom_type[g]), np.array(m.geom_size[g]), int(m.geom_bodyid[g])
@@ -40,7 +40,7 @@ def shapes_of(m: Any, bodies: list[str]) -> list[Shape]:
         material, colour = int(m.geom_matid[g]), m.geom_rgba[g]
         if material >= 0 and np.array_equal(colour, _NO_COLOUR):
             colour = m.mat_rgba[material]
-        if colour[3] == 0:  # it cannot be seen
+        if colour[3] == 0:  # invisible
             purposes = [purpose for purpose in purposes if purpose != "visual"]
         body, size_of = bodies[on] if on else "", tuple(map(float, sizes))
         made += [Shape(body, name, size_of, placement, hex_colour(colour), triangles=triangles, purpose=purpose) for purpose in purposes]

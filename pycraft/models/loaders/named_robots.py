@@ -1,4 +1,4 @@
-"""Robots by name: those of the package, and those that installed packages of robot descriptions bring along."""
+"""Robots by name, from the package and from installed packages of robot descriptions."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ... import _core
 from .toml_file import nearest
 
 ENDINGS = (".toml", ".urdf", ".xml", ".mjcf", ".sdf", ".xacro")
-"""What the names of files of models end in."""
+"""Endings of names of model files."""
 
 
 def is_name(path: object) -> bool:
-    """Return whether a text is the name of a robot: no file is called so, and no file of a model would be."""
+    """Return whether a text is the name of a robot: no file has this name, and it has no ending of a model file."""
     if not isinstance(path, str) or not path.strip() or path.lstrip().startswith("<") or "/" in path or "\\" in path or "\0" in path:
         return False
     return not path.lower().endswith(ENDINGS) and not Path(path).exists()
@@ -26,8 +26,8 @@ def is_name(path: object) -> bool:
 def find(name: str) -> Path | Any:
     """Return the file of the robot of this name, or the function that makes the package's own.
 
-    The package's own robots come first, then files of example-robot-data (`ur5_robot`, `anymal`), then modules of robot_descriptions
-    (`ur5_description`), which fetch their files when they are asked for the first time.
+    The package's own robots have priority, then files of example-robot-data (`ur5_robot`, `anymal`), then modules of robot_descriptions
+    (`ur5_description`), which download their files on first use.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def find(name: str) -> Path | Any:
 
 
 def nearest_of_many(name: str, known: list[str], few: list[str]) -> str:
-    """Return the nearest names out of many; where none is near, those of the few."""
+    """Return the nearest names out of many; if none is near, those of `few`."""
     from difflib import get_close_matches
 
     near = get_close_matches(name.lower(), known, 3) or [other for other in known if name.lower() in other.lower()][:3]
@@ -59,7 +59,7 @@ def nearest_of_many(name: str, known: list[str], few: list[str]) -> str:
 
 @lru_cache(maxsize=1)
 def example_robots() -> dict[str, Path]:
-    """Return the URDF and SDF files of the installed example-robot-data by the names of the files; empty where it is not installed."""
+    """Return the URDF and SDF files of the installed example-robot-data by the names of the files; empty if it is not installed."""
     for folder in example_folders():
         found: dict[str, Path] = {}
         for ending in ("urdf", "sdf"):
@@ -80,7 +80,7 @@ def example_folders() -> Iterator[Path]:
 
 @lru_cache(maxsize=1)
 def described_robots() -> tuple[str, ...]:
-    """Return the names of the modules of the installed robot_descriptions; empty where it is not installed."""
+    """Return the names of the modules of the installed robot_descriptions; empty if it is not installed."""
     spec = importlib.util.find_spec("robot_descriptions")
     if spec is None or not spec.submodule_search_locations:
         return ()
@@ -90,7 +90,7 @@ def described_robots() -> tuple[str, ...]:
 def _described(name: str) -> Path:
     try:
         module = importlib.import_module(f"robot_descriptions.{name}")
-    except Exception as error:  # it clones a repository, and says what is wrong in many ways
+    except Exception as error:  # it clones a repository, which may fail in many ways
         raise _core.ModelError(f"robot_descriptions.{name} does not give its files: {type(error).__name__}: {error}") from error
     for attribute in ("URDF_PATH", "MJCF_PATH"):
         if path := getattr(module, attribute, None):

@@ -1,18 +1,18 @@
-"""SDF files read into a `Multibody`: links become bodies, joints hinges, with the file's names and order (docs/sdf.md).
+"""Read SDF files into a `Multibody`: links become bodies, joints hinges, with the file's names and order (docs/sdf.md).
 
 joint type                  hinge              coordinates
 revolute, continuous        pin                angle about the axis
 prismatic                   slider             travel along the axis
-screw                       screw              angle; screw_thread_pitch is metres a turn
+screw                       screw              angle; screw_thread_pitch is metres per turn
 ball                        ball               quaternion (w, x, y, z)
 universal                   universal          angles about axis and axis2
 revolute2                   custom, two pins   angles about axis and axis2
 fixed                       weld               none
 
-A model is read as it stands: poses by the rules of frames (`relative_to`, `attached_to`, `expressed_in`), at coordinates zero. The first
-joint that reaches a link is its hinge; each further one is a loop of the model. A link that no joint reaches flies, as in Gazebo, unless
-the model is static or `root="fixed"` says otherwise. Names are scoped by "::" in models within models, and in worlds of several models. A
-link without gravity is one whose weight is held: `Multibody.offers`.
+A model is read in its initial state: poses by the rules of frames (`relative_to`, `attached_to`, `expressed_in`), at coordinates zero. The
+first joint that reaches a link is its hinge; each further one is a loop of the model. A link that no joint reaches is free, as in Gazebo,
+unless the model is static or `root="fixed"`. Names are scoped by "::" in models within models, and in worlds of several models. A link
+without gravity is a compensated weight: `Multibody.offers`.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ _SILENT_VALUES = {"kinematic": ("false", "0"), "enable_wind": ("false", "0"), "m
 def read(
     file: XmlFile, *, root: str | None, mimic: str, welds: str, strict: bool, package_dirs: Iterable[str | os.PathLike[str]] = ()
 ) -> tuple[Multibody, list[str]]:
-    """Return the model of an SDF file, and what is worth a warning about it (each text with file and line).
+    """Return the model of an SDF file, and its warnings (each text with file and line).
 
-    Parameters are those of `pycraft.load`. Raises ModelError, with file, line and element, for what the file gets wrong.
+    Parameters as in `pycraft.load`. Raises ModelError, with file, line and element, for faults of the file.
     """
     scope, name, gravity = _scope(file)
     if mimic == "refuse" and (followers := _followers(scope)):
@@ -78,8 +78,8 @@ def read(
 
 
 def _scope(file: XmlFile) -> tuple[Scope, str, np.ndarray | None]:
-    """All names of the file, its name, and the gravity of its world."""
-    version_of(file)  # before anything else goes by it
+    """Return all names of the file, its name, and the gravity of its world."""
+    version_of(file)  # before anything else depends on it
     scope, worlds = Scope(file), file.children(file.root, "world")
     if len(worlds) > 1:
         raise file.error(worlds[1], f"the file has {len(worlds)} worlds; a model is one of them")
@@ -103,14 +103,14 @@ def _scope(file: XmlFile) -> tuple[Scope, str, np.ndarray | None]:
 
 
 class _Builder:
-    """Links and joints on their way to a model."""
+    """Builds a model from links and joints."""
 
     def __init__(self, scope: Scope, model: Multibody, root: str | None):
         self.scope, self.model, self.file, self.root = scope, model, scope.file, root
         self.ends = {name: self._ends(joint) for name, joint in scope.joints.items()}
         self.world = {name: scope.in_world(name, link.element) for name, link in scope.links.items()}
         self.there: set[str] = set()  # links that are in the model
-        self.closing: list[str] = []  # joints that are loops
+        self.closing: list[str] = []  # joints that become loops
 
     def _ends(self, joint: Joint) -> tuple[str, str]:
         parent, child = (self.scope.link_of(end, joint.element) for end in (joint.parent, joint.child))
@@ -121,13 +121,13 @@ class _Builder:
         return parent, child
 
     def build(self) -> None:
-        """Add what no joint carries, then bodies by the first joint of the file that reaches them; further joints are loops."""
+        """Add links that no joint carries, then bodies by the first joint of the file that reaches them; further joints become loops."""
         carried_by_any = {child for _, child in self.ends.values()}
         roots = [name for name in self.scope.links if name not in carried_by_any]
         for name in roots:
             self._add_root(name, len(roots) == 1)
         self._reach([WORLD, *roots])
-        for name in self.scope.links:  # links in a circle that nothing carries: the first of them is the root
+        for name in self.scope.links:  # a circle of links without a carrier: the first of them is the root
             if not self._stands(name):
                 self._add_root(name, not roots)
                 self._reach([name])
@@ -135,7 +135,7 @@ class _Builder:
             self._close(self.scope.joints[name])
 
     def _reach(self, starts: list[str]) -> None:
-        """Add the bodies that joints reach from these links, each by the earliest joint of the file that does."""
+        """Add the bodies that joints reach from these links, each by the earliest such joint of the file."""
         outboard: dict[str, list[int]] = {}
         for k, (parent, _) in enumerate(self.ends.values()):
             outboard.setdefault(parent, []).append(k)
@@ -155,7 +155,7 @@ class _Builder:
         return link in self.there
 
     def _add_root(self, name: str, alone: bool) -> None:
-        """A link that no joint carries: it flies, or stands where the file puts it."""
+        """Add a link that no joint carries: free, or fixed where the file places it."""
         free = self.root != "fixed" and name not in self.scope.static
         hinge = "root" if alone and "root" not in self.scope.joints else f"root of {name}"
         if self.root == "free" and "root" in self.scope.joints and alone:
@@ -177,7 +177,7 @@ class _Builder:
     def _add_body(self, name: str) -> None:
         joint, (parent, link) = self.scope.joints[name], self.ends[name]
         how = self._hinge(joint, self.world[parent] if parent != WORLD else np.eye(4), self.world[link])
-        if link in self.scope.static:  # nothing of a static model moves
+        if link in self.scope.static:  # nothing in a static model moves
             how = {"hinge": "weld", "placement": how["placement"]}
         self._add(self.scope.links[link], None if parent == WORLD else parent, joint.name, how, joint.element)
 
@@ -190,7 +190,7 @@ class _Builder:
             raise self.file.error(at, str(error)) from None
 
     def _hinge(self, joint: Joint, parent: np.ndarray, child: np.ndarray) -> dict[str, Any]:
-        """How the child moves on the parent, from their poses (4, 4) in the world."""
+        """Return the hinge of the child on the parent, from their poses (4, 4) in the world."""
         placement = np.linalg.inv(parent) @ child
         placement[:3, :3], placement[3] = parent[:3, :3].T @ child[:3, :3], (0, 0, 0, 1)
         how: dict[str, Any] = {"hinge": joint.kind, "placement": placement}
@@ -212,7 +212,7 @@ class _Builder:
         return how | ({"axes": axes} if len(axes) > 1 else {"axis": axes[0]} if axes else {})
 
     def _close(self, joint: Joint) -> None:
-        """A joint to a link that another one carries already."""
+        """Declare a loop for a joint to a link that another joint already carries."""
         parent, child = self.ends[joint.name]
         if {parent, child} <= self.scope.static | {WORLD}:
             return
@@ -227,7 +227,7 @@ class _Builder:
             raise self.file.error(joint.element, str(error)) from None
 
     def add_frames(self) -> None:
-        """Frames of the file are nodes."""
+        """Add frames of the file as nodes."""
         for name in self.scope.named_frames:
             element = self.scope.frames[name].element
             on = self.scope.link_of(name, element)
@@ -253,7 +253,7 @@ def _followers(scope: Scope) -> list[tuple[Joint, Element]]:
 
 
 def _couple(scope: Scope, model: Multibody) -> None:
-    """q = multiplier (q of the leader - reference) + offset, as couplings with the names of the joints that follow."""
+    """Declare q = multiplier (q of the leader - reference) + offset, as couplings with the names of the following joints."""
     file = scope.file
     for joint, mimic in _followers(scope):
         leader = (mimic.get("joint") or "").strip()
@@ -275,7 +275,7 @@ def _couple(scope: Scope, model: Multibody) -> None:
 
 
 def _leave_aside(scope: Scope, model: Multibody, gravity: np.ndarray | None) -> None:
-    """Damping, friction, springs and bounds by coordinate; gravity; links whose weight is held."""
+    """Store damping, friction, springs and bounds by coordinate; gravity; links with compensated weight."""
     found: dict[str, dict[str, float]] = {}
     rest = np.array(model.zero_q())
     for name, joint in scope.joints.items():
@@ -302,7 +302,7 @@ def _leave_aside(scope: Scope, model: Multibody, gravity: np.ndarray | None) -> 
 
 
 def _not_read(file: XmlFile) -> list[str]:
-    """What moves bodies in a simulator of SDF and is not read here, in words."""
+    """Return elements that move bodies in a simulator of SDF and are not read here, in words."""
     found = []
     for element in file.root.iter():
         name, owner = local_name(element), element.getparent()

@@ -1,4 +1,4 @@
-"""The elements of an SDF file: links, joints and frames by their scoped names, before they are put together (see `sdf`)."""
+"""The elements of an SDF file: links, joints and frames by their scoped names, before they are assembled (see `sdf`)."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ TYPES = {
     "fixed": "weld",
 }
 _NO_LIMIT = 1e16
-"""From here on a limit is none: what the format has by default."""
+"""Limits from this value on mean no limit: the default of the format."""
 
 
 @dataclass(slots=True)
 class Frame:
-    """A link, joint or frame: its pose (4, 4) in the frame `within`, and for frames the one that they are attached to."""
+    """A link, joint or frame: its pose (4, 4) in the frame `within`, and for frames the link that they are attached to."""
 
     element: Element
     within: str
@@ -51,7 +51,7 @@ class Link:
 
 @dataclass(slots=True)
 class Axis:
-    """An axis of a joint, expressed in a frame, its limits, and what effects are made of, by the quantities of `Multibody.left_aside`."""
+    """An axis of a joint, expressed in a frame, its limits, and data for effects, by the quantities of `Multibody.left_aside`."""
 
     element: Element
     direction: np.ndarray
@@ -89,7 +89,7 @@ class Scope:
 
     # ------------------------------------------------------------------ reading
     def read(self, model: Element, prefix: str, outer: str, static: bool = False) -> None:
-        """Read a model and those nested in it. `prefix` stands before its names, `outer` is the frame that its pose is in."""
+        """Read a model and those nested in it. `prefix` precedes its names, `outer` is the frame of its pose."""
         file = self.file
         if (include := next(iter(file.children(model, "include")), None)) is not None:
             uri = text_of(file, include, "uri", "")
@@ -124,7 +124,7 @@ class Scope:
         self._place_model(model, prefix, outer)
 
     def _place_model(self, model: Element, prefix: str, outer: str) -> None:
-        """The frame of a model: where its <pose> puts it, or the frame in it that is its placement_frame."""
+        """Return the frame of a model: at its <pose>, or as given by the frame in it that is its placement_frame."""
         own = prefix + MODEL
         within, pose = _pose(self.file, model, outer)
         relative = outer[: len(outer) - len(MODEL)] if outer.endswith(MODEL) else ""
@@ -209,7 +209,8 @@ class Scope:
         )
 
     def _pitch(self, element: Element, name: str) -> float:
-        """Metres per radian: of screw_thread_pitch, metres a turn, or of the older thread_pitch, radians a metre, left-handed."""
+        """Return metres per radian from screw_thread_pitch, metres per turn, or from the older thread_pitch, radians per metre,
+        left-handed."""
         for tag in ("screw_thread_pitch", "thread_pitch"):
             if (inner := next(iter(self.file.children(element, tag)), None)) is not None:
                 value = numbers_of(self.file, inner, 1, element)[0]
@@ -220,7 +221,7 @@ class Scope:
 
     # ------------------------------------------------------------------ poses and ends
     def pose(self, name: str, upto: str, element: Element) -> np.ndarray:
-        """The pose (4, 4) of a frame in another one that its poses lead to. ModelError for a name that is none, and for a circle."""
+        """Return the pose (4, 4) of a frame in another one that its poses lead to. ModelError for an unknown name, and for a circle."""
         X, seen = np.eye(4), [name]
         while name != upto:
             if name not in self.frames:
@@ -238,11 +239,11 @@ class Scope:
         return X
 
     def in_world(self, name: str, element: Element) -> np.ndarray:
-        """The pose (4, 4) of a frame in the world."""
+        """Return the pose (4, 4) of a frame in the world."""
         return np.eye(4) if name == WORLD else self.pose(name, WORLD, element)
 
     def link_of(self, name: str, element: Element) -> str:
-        """The link that a frame is attached to; "world" for the world."""
+        """Return the link to which a frame is attached; "world" for the world."""
         seen: list[str] = []
         while name not in self.links and name != WORLD:
             if name in self.canonical:
@@ -263,7 +264,7 @@ class Scope:
 
 
 def version_of(file: XmlFile) -> tuple[int, ...]:
-    """The version of the format that the file declares, (1, 6) where it declares none."""
+    """Return the version of the format that the file declares, default (1, 6)."""
     try:
         return tuple(map(int, (file.root.get("version") or "1.6").strip().split(".")))
     except ValueError:
@@ -271,7 +272,7 @@ def version_of(file: XmlFile) -> tuple[int, ...]:
 
 
 def text_of(file: XmlFile, element: Element, tag: str, default: str | None = None) -> str:
-    """The text of a child that must be there and not empty, unless there is a default."""
+    """Return the text of a child, which must exist and not be empty unless there is a default."""
     inner = next(iter(file.children(element, tag)), None)
     text = (inner.text or "").strip() if inner is not None else ""
     if not text and default is None:
@@ -280,7 +281,7 @@ def text_of(file: XmlFile, element: Element, tag: str, default: str | None = Non
 
 
 def truth(file: XmlFile, element: Element, tag: str, default: bool) -> bool:
-    """Whether a child says "true" or "1"."""
+    """Check that a child has the text "true" or "1"."""
     text = text_of(file, element, tag, "").lower()
     if text not in ("", "true", "false", "1", "0"):
         raise file.error(element, f"{label(element)}: <{tag}> is {text!r:.40}; write true or false")
@@ -288,7 +289,8 @@ def truth(file: XmlFile, element: Element, tag: str, default: bool) -> bool:
 
 
 def numbers_of(file: XmlFile, element: Element, count: int | None, owner: Element, infinite: bool = False) -> list[float]:
-    """The numbers of an element's text; ModelError, naming link or joint `owner`, for another count and for what is no number."""
+    """Return the numbers of an element's text; ModelError, naming link or joint `owner`, for another count or words that are not
+    numbers."""
     words = (element.text or "").split()
     try:
         values = [float(word) for word in words]
@@ -308,7 +310,7 @@ def numbers_of(file: XmlFile, element: Element, count: int | None, owner: Elemen
 
 
 def _pose(file: XmlFile, owner: Element, default: str) -> tuple[str, np.ndarray]:
-    """The frame that a <pose> is relative to, `default` for none, and the pose (4, 4); the identity where there is no <pose>."""
+    """Return the frame that a <pose> is relative to, or `default`, and the pose (4, 4); the identity without a <pose>."""
     element = next(iter(file.children(owner, "pose")), None)
     if element is None:
         return default, np.eye(4)
@@ -317,14 +319,14 @@ def _pose(file: XmlFile, owner: Element, default: str) -> tuple[str, np.ndarray]
 
 
 def pose_matrix(file: XmlFile, element: Element | None, owner: Element) -> np.ndarray:
-    """The pose (4, 4) that the text of a <pose> gives: x y z and roll, pitch, yaw, or a quaternion x y z w."""
+    """Return the pose (4, 4) in the text of a <pose>: x y z and roll, pitch, yaw, or a quaternion x y z w."""
     X = np.eye(4)
     if element is None or not (element.text or "").strip():
         return X
     if (element.get("rotation_format") or "euler_rpy").strip() == "quat_xyzw":
         values = numbers_of(file, element, 7, owner)
         if not np.linalg.norm(values[3:]) > 1e-8:
-            raise file.error(element, f"{label(owner)}: the quaternion of its <pose> has length 0; no rotation is 0 0 0 1")
+            raise file.error(element, f"{label(owner)}: the quaternion of its <pose> has length 0; the identity is 0 0 0 1")
         X[:3, :3] = rotation_from_quaternion(np.roll(values[3:], 1))
     else:
         values = numbers_of(file, element, 6, owner)
@@ -335,7 +337,7 @@ def pose_matrix(file: XmlFile, element: Element | None, owner: Element) -> np.nd
 
 
 def _link(file: XmlFile, element: Element, name: str) -> Link:
-    """Its inertia; the format gives a link without one 1 kg and 1 kg m² about every axis."""
+    """Return a link with its inertia; by the format's default 1 kg and 1 kg m² about every axis."""
     inertial = next(iter(file.children(element, "inertial")), None)
     has_gravity = truth(file, element, "gravity", True)
     if inertial is None:

@@ -23,13 +23,13 @@ _SIZES = {
     "ellipsoid": (("radii", 3),),
 }
 _WITHOUT_SIZE = ("plane", "heightmap", "empty", "image")
-"""What is no shape of a body."""
+"""Geometries that are not shapes of a body."""
 
 
 def shapes_of(
     file: XmlFile, scope: Scope, model: Multibody, package_dirs: Iterable[str | os.PathLike[str]]
 ) -> tuple[list[Shape], list[str]]:
-    """All shapes of the file, on bodies and nodes with the names of the links, and warnings of those that cannot be read."""
+    """Return all shapes of the file, on bodies and nodes with the names of the links, and warnings of those that cannot be read."""
     beside = beside_of(file, package_dirs)
     found: list[Shape] = []
     warnings: list[str] = []

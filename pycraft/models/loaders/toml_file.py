@@ -1,4 +1,4 @@
-"""A TOML file being read: its tables, and errors that say file, line, table and key."""
+"""Read a TOML file: its tables, and errors with file, line, table and key."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .file_contents import contents
 from .toml_lines import Place, lines_of, statements, tomllib
 
 _MOST_PARTS = 100
-"""Of one key: tomllib's memory goes by their square."""
+"""Limit for one key: the memory of tomllib grows with the square."""
 _MANY_DOTS = re.compile(rf"(?:\.[^.\n]*){{{_MOST_PARTS}}}")
 
 
@@ -29,18 +29,18 @@ class TomlFile:
     Attributes
     ----------
     path : str
-    data : what tomllib makes of the file
+    data : the result of tomllib
 
     Raises
     ------
     ModelError
-        A file that is not there or cannot be read, that is not UTF-8, or not TOML: with its line.
+        A missing or unreadable file, a file that is not UTF-8, or not TOML: with the line.
     """
 
     def __init__(self, path: str | os.PathLike[str]):
         self.path, data = contents(path)
         try:
-            self.text = data.decode("utf-8-sig").replace("\r\n", "\n")  # as tomllib has it
+            self.text = data.decode("utf-8-sig").replace("\r\n", "\n")  # as in tomllib
         except UnicodeDecodeError as error:
             line = data.count(b"\n", 0, error.start) + 1
             raise _core.ModelError(f"{self.path}:{line}: a byte that is not UTF-8 ({error.reason}); save the file in UTF-8") from None
@@ -49,7 +49,7 @@ class TomlFile:
             self.data: dict[str, Any] = tomllib.loads(self.text)
         except RecursionError:
             raise _core.ModelError(f"{self.path}: lists or tables within each other, too deep to be read") from None
-        except ValueError as error:  # TOMLDecodeError is one, and so are numbers of too many digits
+        except ValueError as error:  # TOMLDecodeError is a ValueError, and so are numbers of too many digits
             found = re.search(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
             what, at_line, column = found.groups() if found else (str(error), None, None)
             at = f":{at_line or self.text.count(chr(10)) + 1}" if found else ""
@@ -71,31 +71,31 @@ class TomlFile:
         return lines_of(self.text)
 
     def at(self, place: Place) -> str:
-        """Where a value is: file:line, the line of the statement that it is a part of."""
+        """Return the location of a value: file:line, the line of the statement that contains it."""
         while place and place not in self._lines:
             place = place[:-1]
         return f"{self.path}:{self._lines.get(place, 1)}"
 
     def error(self, place: Place, text: str) -> Exception:
-        """A ModelError to raise: "file:line: text"."""
+        """Return a ModelError to raise: "file:line: text"."""
         return _core.ModelError(f"{self.at(place)}: {text}")
 
 
 class TomlTable:
-    """One table of a file, its values checked as they are asked for.
+    """One table of a file, with values that are checked when they are read.
 
     Parameters
     ----------
     file : TomlFile
-    data : the table as tomllib has it
-    place : where it is in the file
-    label : how errors call it: "body 'upper'"
-    keys : the names that it may have; None: any
+    data : the table as in tomllib
+    place : its place in the file
+    label : its name in errors, such as "body 'upper'"
+    keys : the allowed keys; None: any
 
     Raises
     ------
     ModelError
-        A key that it may not have, with the nearest one that it may; whatever is asked for and is of another type or size.
+        An unknown key, with the nearest known one; a value of the wrong type or size.
     """
 
     def __init__(self, file: TomlFile, data: Any, place: Place, label: str, keys: Sequence[str] | None):
@@ -109,11 +109,11 @@ class TomlTable:
         return key in self.data
 
     def at(self, key: str | None = None) -> str:
-        """file:line of a key, or of the table."""
+        """Return file:line of a key, or of the table."""
         return self.file.at((*self.place, key) if key is not None else self.place)
 
     def error(self, key: str | None, text: str) -> Exception:
-        """A ModelError to raise, with the line of a key of this table, or of the table."""
+        """Return a ModelError to raise, with the line of a key of this table, or of the table."""
         return self.file.error((*self.place, key) if key is not None else self.place, text)
 
     def _wrong(self, key: str, wanted: str) -> Exception:
@@ -122,7 +122,7 @@ class TomlTable:
 
     # ------------------------------------------------------------------ values
     def text(self, key: str, default: str | None = None, empty: bool = False) -> str:
-        """A text, which may be empty if so said; ModelError where it is missing and has no default."""
+        """Return a text, which may be empty if `empty`; ModelError if it is missing without a default."""
         if key not in self.data and default is not None:
             return default
         if key not in self.data:
@@ -132,14 +132,14 @@ class TomlTable:
         return self.data[key]
 
     def texts(self, key: str) -> list[str]:
-        """A list of texts; empty where the key is missing."""
+        """Return a list of texts; empty if the key is missing."""
         value = self.data.get(key, [])
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self._wrong(key, 'a list of texts: ["...", "..."]')
         return list(value)
 
     def choice(self, key: str, among: Sequence[str], default: str) -> str:
-        """One of several words."""
+        """Return one of several words."""
         word = self.data.get(key, default)
         if word not in among:
             near = f"; did you mean {near[0]!r}?" if isinstance(word, str) and (near := get_close_matches(word, among, 1)) else ""
@@ -147,14 +147,14 @@ class TomlTable:
         return word
 
     def flag(self, key: str) -> bool:
-        """true or false; false where it is missing."""
+        """Return true or false; false if it is missing."""
         value = self.data.get(key, False)
         if not isinstance(value, bool):
             raise self._wrong(key, "true or false")
         return value
 
     def number(self, key: str, default: float, unit: str, infinite: bool = False) -> float:
-        """A finite number; with `infinite`, inf and -inf too."""
+        """Return a finite number; with `infinite`, also inf and -inf."""
         if key not in self.data:
             return default
         number = _number(self.data[key], infinite)
@@ -163,7 +163,7 @@ class TomlTable:
         return number
 
     def vector(self, key: str, count: int | None, what: str, infinite: bool = False) -> list[float] | None:
-        """So many numbers, None for one or more; None where the key is missing."""
+        """Return that many numbers, for None one or more; None if the key is missing."""
         if key not in self.data:
             return None
         numbers = _vector(self.data[key], count, infinite)
@@ -172,7 +172,7 @@ class TomlTable:
         return numbers
 
     def vectors(self, key: str, count: int | None, what: str, size: int | None = 3, infinite: bool = False) -> list[list[float]] | None:
-        """So many lists of `size` numbers, None for any count of them; None where the key is missing."""
+        """Return that many lists of `size` numbers, for None any count of them; None if the key is missing."""
         if key not in self.data:
             return None
         value = self.data[key]
@@ -183,11 +183,11 @@ class TomlTable:
 
     # ------------------------------------------------------------------ tables within
     def table(self, key: str, keys: Sequence[str] | None, label: str) -> TomlTable | None:
-        """A table of this table; None where it is missing."""
+        """Return a table within this table; None if it is missing."""
         return TomlTable(self.file, self.data[key], (*self.place, key), label, keys) if key in self.data else None
 
     def tables(self, key: str, keys: Sequence[str], label: str, named: bool = False) -> list[TomlTable] | None:
-        """A list of tables, called by their `label` and number, or by their names. None where the key is missing."""
+        """Return a list of tables, labelled by `label` and number, or by their names. None if the key is missing."""
         if key not in self.data:
             return None
         items = self.data[key]
@@ -200,7 +200,7 @@ class TomlTable:
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """The remedy for a name that is none of these: the nearest one, or all of a few."""
+    """Return the remedy for an unknown name: the nearest name, or all of a few."""
     names = list(names)
     near = get_close_matches(name[:200], names, 1) or get_close_matches(name[:200].lower(), names, 1)
     if near:
@@ -235,11 +235,11 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _shown(value: Any) -> str:
-    """A value as the file has it, as far as that is short."""
+    """Return a value as in the file, shortened."""
     if isinstance(value, Mapping):
         return "a table"
     try:
         text = ("false", "true")[value] if isinstance(value, bool) else repr(value) if isinstance(value, (str, list)) else str(value)
-    except ValueError:  # Python writes numbers of thousands of digits only when it is told to
+    except ValueError:  # Python writes numbers of thousands of digits only on request
         return "a number of too many digits"
     return text if len(text) <= 60 else text[:57] + "..."

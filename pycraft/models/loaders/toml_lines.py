@@ -1,7 +1,7 @@
-"""Where in a TOML file a value stands: tomllib gives values and no lines, and errors about values need both.
+"""Lines of values in a TOML file: tomllib returns values without lines, and errors about values need both.
 
-The file, which tomllib has read, is cut into its statements (a key with its value, or the head of a table). What a statement's keys are,
-tomllib itself says of the statement alone: strings, escapes, dots and quotes are read by nobody else.
+The file, which tomllib has read, is split into its statements (a key with its value, or the head of a table). tomllib itself reads the keys
+of each statement: strings, escapes, dots and quotes are parsed nowhere else.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ else:
     import tomli as tomllib
 
 Place: TypeAlias = "tuple[str | int, ...]"
-"""Where a value is: names of keys, and numbers in lists: ("bodies", 2, "mass")."""
+"""The place of a value: names of keys, and numbers in lists: ("bodies", 2, "mass")."""
 
 _TOKENS = re.compile(
     r"""(?P<skipped>\#[^\n]*|[^\S\n]+)
@@ -31,7 +31,7 @@ _TOKENS = re.compile(
 
 @dataclass(slots=True)
 class Statement:
-    """One statement: its text, the line it begins on, where its value begins in the text, the lines on which items of its list begin."""
+    """One statement: its text, its first line, the start of its value in the text, the first lines of items of its list."""
 
     text: str
     line: int
@@ -40,7 +40,7 @@ class Statement:
 
 
 def statements(text: str) -> Iterator[Statement]:
-    """The statements of a TOML text, in order, without comments and blank lines around them."""
+    """Yield the statements of a TOML text, in order, without comments and blank lines around them."""
     line, depth, begin, end = 1, 0, -1, 0
     now, listed, awaited = Statement("", 1), False, False
     for token in _TOKENS.finditer(text):
@@ -76,9 +76,9 @@ def statements(text: str) -> Iterator[Statement]:
 
 
 def lines_of(text: str) -> dict[Place, int]:
-    """The line of every key and table of a TOML text that tomllib reads, and of the items of lists that are written over several lines."""
+    """Return the line of every key and table of a TOML text that tomllib reads, and of the items of lists written over several lines."""
     lines: dict[Place, int] = {}
-    counts: dict[Place, int] = {}  # of each list of tables, the number of the last one
+    counts: dict[Place, int] = {}  # for each list of tables, the number of the last one
     table: Place = ()
     for statement in statements(text):
         data = tomllib.loads(statement.text)
@@ -100,7 +100,7 @@ def lines_of(text: str) -> dict[Place, int]:
 
 
 def _head(data: Any, counts: dict[Place, int]) -> Place:
-    """The place of the table that a head begins: [a.b], or [[a.b]], one more of a list."""
+    """Return the place of the table that a head begins: [a.b], or [[a.b]], one more of a list."""
     names: list[str] = []
     while isinstance(data, dict) and data:
         ((name, data),) = data.items()

@@ -1,8 +1,8 @@
-"""Loops of a model in TOML: tables [[loops]], each with its kind, the frames a and b, and what the kind has (docs/models.md, Files).
+"""Loops of a model in TOML: tables [[loops]], each with its kind, the frames a and b, and the keys of the kind (docs/models.md, Files).
 
-Of a hinge the arguments of `Multibody.add_loop` by their names, of a custom one its subhinges; of "wheel" and
-"rolling ball" the radius; of "surface" quadratic, linear and constant; of "curve" parameters, closed, and coefficients, those of each
-piece in turn; of "coupling" constant and coordinates = { name = coefficients of 1, q, q², ... }.
+For a hinge the arguments of `Multibody.add_loop` by their names, for a custom one its subhinges; for "wheel" and "rolling ball" the radius;
+for "surface" quadratic, linear and constant; for "curve" parameters, closed, and coefficients, those of each piece in turn; for "coupling"
+constant and coordinates = { name = coefficients of 1, q, q², ... }.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _VECTOR = "three finite numbers: [x, y, z]"
 
 
 def add_loop(model: Multibody, table: TomlTable, rotation: Any, position: Any) -> None:
-    """Declares what a table tells of. ModelError with file, line, loop and key."""
+    """Declare the loop of a table. ModelError with file, line, loop and key."""
     kind, name = table.choice("kind", tuple(_KEYS), "pin"), table.text("name")
     keys = _KEYS[kind] if kind == "coupling" else ("a", "b", *_KEYS[kind])
     if wrong := [key for key in table.data if key not in ("name", "kind", *keys)]:
@@ -70,15 +70,15 @@ def add_loop(model: Multibody, table: TomlTable, rotation: Any, position: Any) -
 
 
 def _parts(table: TomlTable, kind: str) -> dict[str, Any]:
-    """What the table says of its kind, beside a hinge's placement."""
+    """Return the arguments of the table's kind, except a hinge's placement."""
     if kind == "coupling":
-        return {"coordinates": _coefficients(table), "constant": table.number("constant", 0.0, "that of the relation")}
+        return {"coordinates": _coefficients(table), "constant": table.number("constant", 0.0, "the constant of the relation")}
     if kind == "surface":
         A = table.vectors("quadratic", 3, "three rows of three finite numbers: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]")
         return {
             "quadratic": A,
             "linear": table.vector("linear", 3, _VECTOR),
-            "constant": table.number("constant", 0.0, "that of the surface"),
+            "constant": table.number("constant", 0.0, "the constant of the surface"),
         }
     if kind == "curve":
         return {

@@ -1,4 +1,4 @@
-"""Forces on bodies that an earlier file spoke of, in TOML: tables [[held_weights]] and [[fluid_boxes]] (docs/models.md, Files)."""
+"""Forces on bodies from an earlier file, in TOML: tables [[held_weights]] and [[fluid_boxes]] (docs/models.md, Files)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def fluid_box(model: Multibody, table: TomlTable, rotation: Any, position: Any) 
 
 
 def offer_data(offer: Offer, pose: Any) -> Mapping[str, Any]:
-    """Return what a table holds of an offer; `pose` makes the keys of a position and a rotation."""
+    """Return the table of an offer; `pose` makes the keys of a position and a rotation."""
     if isinstance(offer, HeldWeight):
         return {"body": offer.body, "mass": offer.mass, "point": offer.point} | ({} if offer.g is None else {"g": list(offer.g)})
     data = {"body": offer.body, "size": offer.size, "density": offer.density, "viscosity": offer.viscosity, "wind": list(offer.wind)}

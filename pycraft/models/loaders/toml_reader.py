@@ -1,7 +1,7 @@
-"""TOML files read into a `Multibody`: what `Multibody.save` writes, and what a person writes (docs/models.md, Files).
+"""Read TOML files into a `Multibody`: files of `Multibody.save`, and files written by hand (docs/models.md, Files).
 
 A table [[bodies]] has the arguments of `Multibody.add_body` by their names, [[nodes]] those of `add_node`; [[loops]] are those of
-`toml_loops`. Bodies and nodes may stand in any order; children of a body come in the order of their tables.
+`toml_loops`. Bodies and nodes may be in any order; children of a body are in the order of their tables.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .toml_subhinges import subhinges_of
 from .xml_file import abbreviated
 
 FORMAT = 1
-"""Raised when a file means something else than it did."""
+"""Raised when the meaning of a file changes."""
 MODEL = (
     "format", "name", "gravity", "welds", "strict", "bodies", "nodes", "loops", "state", "left_aside", "actuators", "held_weights",
     "fluid_boxes", "not_read", "shapes",
@@ -38,7 +38,7 @@ ACTUATOR = ("name", "coordinate", "gear", "gain", "bias", "control", "force_rang
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 _VECTOR = "three finite numbers: [x, y, z]"
 _LIMITS = "[lower, upper], or [[lower, ...], [upper, ...]] with one of each a subhinge; -inf and inf are no limit"
-# What the core's errors speak of, and the keys that say it: the first that the table has is where the error is.
+# Phrases in the core's errors, and the keys that they concern: the error is at the first that the table has.
 _SPOKEN_OF = (
     ("hinge kind", ("hinge",)),
     ("limit", ("limits",)),
@@ -60,9 +60,9 @@ _SPOKEN_OF = (
 
 
 def read(file: TomlFile, *, root: str, welds: str | None, strict: bool) -> tuple[Multibody, list[str]]:
-    """The model of a TOML file, and what is worth a warning about it (each text with file and line).
+    """Return the model of a TOML file, and its warnings (each text with file and line).
 
-    Parameters are those of `pycraft.load`. Raises ModelError, with file, line, table and key, for what the file gets wrong.
+    Parameters as in `pycraft.load`. Raises ModelError, with file, line, table and key, for faults of the file.
     """
     if root == "free":
         text = 'root="free" is for URDF files; in a TOML file give the body hinge = "free" and hinge_name = "root"'
@@ -73,7 +73,7 @@ def read(file: TomlFile, *, root: str, welds: str | None, strict: bool) -> tuple
 
 
 def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bool = False) -> tuple[Multibody, list[str]]:
-    """The model that a table holds, `name` where it says none, and what is worth a warning about it."""
+    """Return the model of a table, `name` if it has none, and its warnings."""
     if (written := table.data.get("format", FORMAT)) != FORMAT or isinstance(written, bool):
         raise table.error("format", f"format = {written!r:.40} is not read by this version of pycraft, which reads {FORMAT}")
     kept = table.choice("welds", ("lump", "keep"), "lump")
@@ -103,7 +103,7 @@ def read_table(table: TomlTable, name: str, welds: str | None = None, strict: bo
 
 
 def _add_all(model: Multibody, tables: list[TomlTable]) -> None:
-    """Adds bodies and nodes, each when what carries it is there, else in the order of the file."""
+    """Add bodies and nodes, each after its carrier, otherwise in the order of the file."""
     first: dict[str, TomlTable] = {}
     for table in tables:
         name = table.text("name")
@@ -132,7 +132,7 @@ def _keys(table: TomlTable) -> tuple[str, ...]:
 
 
 def _carrier(table: TomlTable, known: dict[str, TomlTable]) -> str | None:
-    """The body or node that a body or node is on, None for the base."""
+    """Return the body or node that carries a body or node, None for the base."""
     key = "body" if "body" in _keys(table) else "parent"
     if key not in table:
         return None
@@ -143,7 +143,7 @@ def _carrier(table: TomlTable, known: dict[str, TomlTable]) -> str | None:
 
 
 def _circle(table: TomlTable, known: dict[str, TomlTable]) -> Exception:
-    """The error for a body that is never added: bodies that carry each other."""
+    """Return the error for a body that is never added: bodies that carry each other."""
     path: dict[str, None] = {}  # in order
     name: str | None = table.data["name"]
     while name is not None and name not in path:
@@ -176,7 +176,7 @@ def _add_body(model: Multibody, table: TomlTable, carrier: str | None) -> None:
         limits=_limits(table),
     )
     try:
-        if "subhinges" in options and kind != "custom":  # those of its kind, by other axes than the kind's own
+        if "subhinges" in options and kind != "custom":  # subhinges of the kind, with other axes than its own
             lower, upper = options["limits"] or (None, None)
             model._add_body(
                 table.data["name"], carrier or "", kind, options["hinge_name"], [], None, 0.0, options["subhinges"], rotation, position,
@@ -189,7 +189,7 @@ def _add_body(model: Multibody, table: TomlTable, carrier: str | None) -> None:
 
 
 def _located(table: TomlTable, text: str) -> Exception:
-    """What the core refuses about a body or node, with the line of the key that says it."""
+    """Return an error of the core about a body or node, with the line of the key that it concerns."""
     rest = text
     for name in (table.data["name"], table.data.get("hinge_name", "")):
         rest = rest.replace(f"'{name}'", "") if name else rest  # a name may hold any word
@@ -203,7 +203,7 @@ def _located(table: TomlTable, text: str) -> Exception:
 
 
 def _hinge(table: TomlTable, kind: str) -> dict[str, Any]:
-    """Axes, point and pitch, or subhinges, as far as the table has them."""
+    """Return axes, point and pitch, or subhinges, if the table has them."""
     options: dict[str, Any] = {}
     if (axis := table.vector("axis", 3, _VECTOR)) is not None:
         options["axis"] = axis
@@ -224,7 +224,7 @@ def _hinge(table: TomlTable, kind: str) -> dict[str, Any]:
 
 
 def _pose(table: TomlTable) -> tuple[Any, list[float] | None]:
-    """Rotation and position that a table gives, None for what it does not."""
+    """Return rotation and position of a table, None for absent ones."""
     given = [key for key in ("rotation", "rpy", "quaternion") if key in table]
     if len(given) > 1:
         raise table.error(given[1], f"{table.label} has {given[0]} and {given[1]}; give one of them")
@@ -234,13 +234,13 @@ def _pose(table: TomlTable) -> tuple[Any, list[float] | None]:
         rotation = rotation_from_rpy(*angles)
     if (quaternion := table.vector("quaternion", 4, "four finite numbers: [w, x, y, z]")) is not None:
         if not 1e-8 < np.linalg.norm(quaternion) < np.inf:
-            raise table.error("quaternion", f"{table.label}: quaternion has no length to speak of; no rotation is [1, 0, 0, 0]")
+            raise table.error("quaternion", f"{table.label}: quaternion has zero length; the identity is [1, 0, 0, 0]")
         rotation = rotation_from_quaternion(quaternion)
     return rotation, position
 
 
 def _inertia(table: TomlTable) -> np.ndarray | None:
-    """Of xx, yy, zz, xy, xz, yz, zero where one is missing."""
+    """Return the inertia from xx, yy, zz, xy, xz, yz, with zero for missing ones."""
     moments = table.table("inertia", MOMENTS, f"{table.label}: inertia")
     if moments is None:
         return None
@@ -269,7 +269,7 @@ def _limits(table: TomlTable) -> tuple[list[float], list[float]] | None:
 
 
 def set_state(model: Multibody, table: TomlTable) -> None:
-    """q and v by the names of hinges; what is not named stays at zero."""
+    """Set q and v by the names of hinges; others stay at zero."""
     for key in ("q", "v"):
         if (given := table.table(key, None, f"{key} of the state")) is None:
             continue
@@ -282,14 +282,14 @@ def set_state(model: Multibody, table: TomlTable) -> None:
 
 
 def _by_hinge(model: Multibody, table: TomlTable, part_of: str, values: np.ndarray) -> np.ndarray:
-    """`values` with those of the hinges that the table names."""
+    """Return `values` with the entries of the hinges that the table names."""
     for name in table.data:
         hinge = _hinge_called(model, name, table)
         part: slice = getattr(hinge, part_of)
         count = part.stop - part.start
         one = count == 1 and not isinstance(table.data[name], list)
         wanted = f"{count} finite numbers, those of a {hinge.kind} hinge" if count != 1 else "one finite number"
-        values[part] = table.number(name, 0.0, "that of the hinge's coordinate") if one else table.vector(name, count, wanted)
+        values[part] = table.number(name, 0.0, "the value of the hinge's coordinate") if one else table.vector(name, count, wanted)
     return values
 
 
@@ -300,7 +300,7 @@ def _hinge_called(model: Multibody, name: str, table: TomlTable) -> Any:
 
 
 def _left_aside(model: Multibody, table: TomlTable) -> dict[str, np.ndarray]:
-    """Numbers by the names of coordinates; NaN where the table has none."""
+    """Return values by the names of coordinates; NaN where the table has none."""
     made: dict[str, np.ndarray] = {}
     numbers = {name: i for i, name in enumerate(model.coordinate_names)}
     for key in table.data:
@@ -316,12 +316,12 @@ def _left_aside(model: Multibody, table: TomlTable) -> dict[str, np.ndarray]:
         for name in given.data:
             if name not in numbers:
                 raise given.error(name, f"{given.label}: no coordinate is called {name!r}; {nearest(name, numbers)}")
-            made[key][numbers[name]] = given.number(name, 0.0, "that of this coordinate", infinite=True)
+            made[key][numbers[name]] = given.number(name, 0.0, "the value of this coordinate", infinite=True)
     return made
 
 
 def _actuator(model: Multibody, table: TomlTable) -> dict[str, Any]:
-    """An actuator with the keys of `Multibody.actuators`; on no coordinate and with a reason why it is no effect, or on one."""
+    """Return an actuator with the keys of `Multibody.actuators`; on a coordinate, or on none with the reason why it is not an effect."""
     coordinate = table.text("coordinate", "") or None
     if coordinate is not None and coordinate not in model.coordinate_names:
         near = nearest(coordinate, model.coordinate_names)

@@ -1,7 +1,7 @@
 """Shapes of a model in TOML: tables [[shapes]], each with its kind, its body, its size and its pose on it (docs/models.md, Files).
 
-A mesh has a file, which is looked for as `resolve_package` says: from the model's file, or from the first path of `beside` and the folders
-of packages after it.
+A mesh has a file, which is located by the rules of `resolve_package`: from the model's file, or from the first path of `beside` and the
+folders of packages after it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _COUNTS = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3, "
 
 
 def shape_of(model: Multibody, table: TomlTable, rotation: Any, position: Any) -> Shape:
-    """What a table tells of. ModelError with file, line, shape and key."""
+    """Return the shape of a table. ModelError with file, line, shape and key."""
     if "kind" not in table:
         raise table.error(None, f"{table.label} has no kind; there are {', '.join(SIZES)}")
     kind, body = table.choice("kind", tuple(SIZES), ""), table.text("body", "")
@@ -40,12 +40,12 @@ def shape_of(model: Multibody, table: TomlTable, rotation: Any, position: Any) -
 
 
 def placement_of(table: TomlTable, rotation: Any, position: Any) -> np.ndarray:
-    """Return the pose (4, 4) of a rotation and a position, either of which may be None. ModelError for what is no rotation."""
+    """Return the pose (4, 4) of a rotation and a position, each optional. ModelError for an invalid rotation."""
     placement = np.eye(4)
     if rotation is not None:
         placement[:3, :3] = rotation
     if not np.allclose(placement[:3, :3] @ placement[:3, :3].T, np.eye(3), rtol=0, atol=1e-8) or np.linalg.det(placement[:3, :3]) < 0:
-        raise table.error("rotation", f"{table.label}: rotation is no rotation matrix")  # as far off as that of a body may be
+        raise table.error("rotation", f"{table.label}: rotation is no rotation matrix")  # with the tolerance for rotations of bodies
     placement[:3, 3] = 0.0 if position is None else position
     return placement
 

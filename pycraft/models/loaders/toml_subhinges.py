@@ -1,4 +1,4 @@
-"""Subhinges of a custom hinge in a TOML file, of bodies and of loops."""
+"""Subhinges of a custom hinge in a TOML file, for bodies and loops."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _VECTOR = "three finite numbers: [x, y, z]"
 
 
 def subhinges_of(table: TomlTable) -> list[dict[str, Any]] | None:
-    """What `subhinges = [...]` of a table says of each; None where it has none. ModelError with file, line and key."""
+    """Return the entries of `subhinges = [...]` of a table; None if it has none. ModelError with file, line and key."""
     given = table.tables("subhinges", SUBHINGE, f"{table.label}: subhinge")
     return None if given is None else [_subhinge(one) for one in given]
 

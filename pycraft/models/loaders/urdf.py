@@ -1,15 +1,15 @@
-"""URDF files read into a `Multibody`: links become bodies, joints hinges, with the file's names and order.
+"""Read URDF files into a `Multibody`: links become bodies, joints hinges, with the file's names and order.
 
 joint type                  hinge     coordinates
 revolute, continuous        pin       angle about the axis
 prismatic                   slider    travel along the axis
-planar                      planar    (x, y, angle) in the plane that the axis is normal to
+planar planar (x, y, angle) in the plane normal to the axis
 ball, spherical             ball      quaternion (w, x, y, z); not in the specification, but some tools write it
 floating                    free      quaternion, position
 fixed                       weld      none
 
 Visuals are `Multibody.shapes`, collision shapes `Multibody.collision_shapes`. Damping, friction and bounds on efforts and velocities are
-effects: they are in `Multibody.left_aside`; what other elements do to the motion is named in `Multibody.not_read` (`urdf_not_read`). Two
+effects: they are in `Multibody.left_aside`; other elements that change the motion are named in `Multibody.not_read` (`urdf_not_read`). Two
 elements are our own, which other readers ignore: inside a joint `<pycraft rotor_inertia="1.14"/>`, one value per coordinate in kg m² or kg
 as seen at the joint; in the robot `<pycraft>` with its loops (`urdf_loops`).
 """
@@ -39,9 +39,9 @@ _CUT = "a model is a tree: take one joint out"
 def read(
     file: XmlFile, *, root: str | None, mimic: str, welds: str, strict: bool, package_dirs: Iterable[str | os.PathLike[str]] = ()
 ) -> tuple[Multibody, list[str]]:
-    """The model of a URDF file, and what is worth a warning about it (each text with file and line).
+    """Return the model of a URDF file, and its warnings (each text with file and line).
 
-    Parameters are those of `pycraft.load`. Raises ModelError, with file, line and element, for what the file gets wrong.
+    Parameters as in `pycraft.load`. Raises ModelError, with file, line and element, for faults of the file.
     """
     elements = Elements(file, follow=mimic != "free")
     _settle_mimics(file, elements.joints, mimic)
@@ -70,7 +70,7 @@ def root_is_fixed(file: XmlFile, root: Link, free: bool) -> list[str]:
 
 
 def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
-    """Refuse joints that follow others, weld them where they stand when the joint they follow is at zero, or check what will be coupled."""
+    """Refuse joints that follow others, weld them at their position with the followed joint at zero, or check those to be coupled."""
     followers = {joint: joint.mimic for joint in joints.values() if joint.mimic}
     if followers and mimic == "refuse":
         pairs = abbreviated(f"{j.name!r} follows {m.follows!r} (line {m.element.sourceline})" for j, m in followers.items())
@@ -92,7 +92,7 @@ def _settle_mimics(file: XmlFile, joints: dict[str, Joint], mimic: str) -> None:
 
 
 def _lock(file: XmlFile, joints: dict[str, Joint], joint: Joint, positions: dict[str, float]) -> None:
-    """Where a locked joint stands, and those that it follows: one that follows a locked joint follows it to where that stands."""
+    """Lock a joint, and those that it follows: a joint that follows a locked joint is locked at the corresponding position."""
     waiting: dict[str, Joint] = {}  # in order: each follows the next
     while joint.mimic and joint.name not in positions:
         element, follows, remedy = joint.mimic.element, joint.mimic.follows, 'load with mimic="free"'
@@ -114,7 +114,7 @@ def _lock(file: XmlFile, joints: dict[str, Joint], joint: Joint, positions: dict
 
 
 def _couple(file: XmlFile, joints: dict[str, Joint], model: Multibody) -> None:
-    """q = multiplier · (that of the joint that is followed) + offset, as loops with the names of the joints that follow."""
+    """Declare q = multiplier · (q of the followed joint) + offset, as loops with the names of the following joints."""
     for joint in joints.values():
         if joint.mimic is None:
             continue
@@ -122,7 +122,7 @@ def _couple(file: XmlFile, joints: dict[str, Joint], model: Multibody) -> None:
         terms = {joint.name: 1.0}
         if leader.kind in ("pin", "slider"):
             terms[leader.name] = -joint.mimic.multiplier
-        elif leader.kind != "weld":  # which stands at zero
+        elif leader.kind != "weld":  # it stays at zero
             text = f'{label(joint.element)} follows {leader.name!r}, which has no single coordinate; load with mimic="free"'
             raise file.error(joint.mimic.element, text)
         model.add_coupling(terms, constant=-joint.mimic.offset, name=joint.name)
@@ -132,7 +132,7 @@ def _couple(file: XmlFile, joints: dict[str, Joint], model: Multibody) -> None:
 
 
 class _Tree:
-    """Links and joints that were found to be a tree: `root`, `inboard[link]` the joint that carries a link."""
+    """Links and joints that form a tree: `root`, `inboard[link]` the joint that carries a link."""
 
     def __init__(self, file: XmlFile, links: dict[str, Link], joints: dict[str, Joint]):
         self.file, self.links, self.joints = file, links, joints
@@ -168,14 +168,14 @@ class _Tree:
             stack.extend(reversed(self.children[name]))
 
     def is_free(self) -> bool:
-        """Whether the root link is but a place for a floating joint called "root" to start from."""
+        """Return whether the root link only carries a floating joint called "root"."""
         carried = self.children[self.root]
         if len(carried) != 1 or self.links[self.root].mass or np.any(self.links[self.root].inertia):
             return False
         return self.inboard[carried[0]].kind == "free" and self.inboard[carried[0]].name == "root"
 
     def _loop(self, name: str) -> Exception:
-        """The error for a link that no root carries: going inboard from it ends in a loop, which is named."""
+        """Return the error for a link that no root carries: the inboard path from it ends in a loop, which is named."""
         path: dict[str, None] = {}  # in order
         while name not in path:
             path[name] = None
@@ -188,12 +188,12 @@ class _Tree:
         return self.file.error(joints[0].element, text)
 
     def with_line(self, body: str, text: str) -> str:
-        """A warning of the core's about a body, with the line of its link."""
+        """Return a warning of the core about a body, with the line of its link."""
         link = self.links.get(body)
         return f"{self.file.at(link.element) if link else self.file.path}: {text}"
 
     def located(self, text: str, link: str, hinge: str) -> Exception:
-        """What the core refuses about a link or the joint that carries it, with the element it comes from."""
+        """Return an error of the core about a link or the joint that carries it, with the element that it comes from."""
         owner, at = self.links[link].element, None
         words = {"body": f"body '{link}'", "hinge": f"hinge '{hinge}'"}
         named = min((k for k in words if words[k] in text), key=lambda k: text.find(words[k]), default="body")  # a name may hold the other
@@ -224,7 +224,7 @@ def _build(tree: _Tree, root: str | None, welds: str, strict: bool) -> Multibody
             )  # fmt: skip
             axes = [joint.axis] if kind in ("pin", "slider", "planar") else []
         lower, upper = limits or (None, None)
-        try:  # what add_body checks of a user's arguments, the reader of the elements has
+        try:  # the reader of the elements has made the checks of add_body
             model._add_body(
                 name, parent, kind, hinge, axes, None, 0.0, None, rotation, position, link.mass, link.com, link.inertia, rotor, lower, upper
             )
@@ -237,7 +237,7 @@ def _build(tree: _Tree, root: str | None, welds: str, strict: bool) -> Multibody
 
 
 def resolve_package(uri: str, urdf_path: str | os.PathLike[str], package_dirs: Iterable[str | os.PathLike[str]] = ()) -> Path:
-    """The file that a mesh or texture name of a URDF file means. The loader opens none; viewers do.
+    """Return the file that a mesh or texture name of a URDF file refers to. The loader opens none; viewers do.
 
     Parameters
     ----------
@@ -245,13 +245,13 @@ def resolve_package(uri: str, urdf_path: str | os.PathLike[str], package_dirs: I
         "package://name/rest", "model://name/rest", "file:///path", or a path, which is relative to the URDF file's folder.
     urdf_path : path of the URDF file
     package_dirs : folders
-        Where packages lie: folders that hold a folder `name` or are called so themselves. Tried first and in order; then
-        the folders above the URDF file, from the nearest up, the root of the file system not among them.
+        Locations of packages: folders that contain a folder `name` or have this name themselves. Searched first and in order; then the
+        folders above the URDF file, from the nearest up, except the root of the file system.
 
     Raises
     ------
     ModelError
-        A file that is nowhere: names the URI and the folders tried. A package:// name that leads out of its package.
+        A file that is not found: names the URI and the folders searched. A package:// name that leads out of its package.
     """
     urdf_path = os.fsdecode(urdf_path)
     above = Path(urdf_path).absolute().parent

@@ -1,4 +1,4 @@
-"""The elements of a URDF file: links and joints, their numbers checked, before they are put together (see `urdf`)."""
+"""The elements of a URDF file: links and joints with checked values, before they are assembled (see `urdf`)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _IDENTITY.setflags(write=False)
 _LINK_PARTS, _INERTIAL_PARTS = frozenset({"inertial"}), frozenset({"origin", "mass", "inertia"})
 _WELD_PARTS = frozenset({"origin", "parent", "child", "axis", "mimic", "pycraft"})
 _JOINT_PARTS = _WELD_PARTS | {"limit", "dynamics"}
-# Of a joint: element, attribute, what it is called in Multibody.left_aside.
+# For a joint: element, attribute, name in Multibody.left_aside.
 _LEFT_ASIDE = {
     "dynamics": (("damping", "damping"), ("friction", "friction")),
     "limit": (("effort", "effort limit"), ("velocity", "velocity limit")),
@@ -63,7 +63,7 @@ class Mimic:
 
 @dataclass(eq=False, slots=True)  # hashed by identity
 class Joint:
-    """A joint: its element, kind of hinge, the pose of the child link in the parent link at zero, and how it moves."""
+    """A joint: its element, kind of hinge, the pose of the child link in the parent link at zero, and its motion."""
 
     name: str
     element: Element
@@ -82,24 +82,24 @@ T = TypeVar("T", Link, Joint)
 
 
 class Elements:
-    """The links and joints of a file by name, in its order, and in `warnings` what is worth a word.
+    """The links and joints of a file by name, in its order, and its `warnings`.
 
     Parameters
     ----------
     file : XmlFile
     follow : bool
-        Whether mimic elements are read.
+        Whether to read mimic elements.
 
     Raises
     ------
     ModelError
-        With file, line, link or joint: names that are missing, taken or unknown, numbers that are none, xacro.
+        With file, line, link or joint: names that are missing, duplicate or unknown, invalid numbers, xacro.
     """
 
     def __init__(self, file: XmlFile, follow: bool):
         self.file, self.follow = file, follow
         self.warnings: list[str] = []
-        self.left_aside: dict[str, dict[str, float]] = {}  # numbers by quantity and joint
+        self.left_aside: dict[str, dict[str, float]] = {}  # values by quantity and joint
         self._about_macros()
         self.links = self._named("link", self._link)
         if not self.links:
@@ -107,10 +107,10 @@ class Elements:
         self.joints = self._named("joint", self._joint)
 
     def _about_macros(self) -> None:
-        """Ignore elements of xacro with a warning, as other readers do; ModelError for expressions in what is read."""
+        """Ignore elements of xacro with a warning, as other readers do; ModelError for expressions in elements that are read."""
         if not self.file.may_have_macros:
             return
-        # In libxml2: to list the attributes of an element one by one takes time by the square of their number.
+        # In libxml2: listing the attributes of an element one by one takes quadratic time.
         is_macro = "contains(name(), 'xacro') or contains(namespace-uri(), 'xacro')"
         macros: list[Any] = self.file.root.xpath(f"//*[{is_macro}]")
         read = "/*[local-name()='robot'] | /*/*[local-name()='link' or local-name()='joint']"
@@ -118,7 +118,7 @@ class Elements:
         expressions: list[Any] = self.file.root.xpath(f"(({read} | {inside})/@*[contains(., '${{') or contains(., '$(')])[1]")
         if macros and self.file.path.lower().endswith(".xacro"):
             raise self.file.error(macros[0], f"<{local_name(macros[0])}> is a xacro macro; {_EXPAND}")
-        for attribute in expressions:  # a string that knows its element
+        for attribute in expressions:  # a string that refers to its element
             element = attribute.getparent()
             raise self.file.error(element, f'{label(element)}: {attribute.attrname}="{attribute}" is a xacro expression; {_EXPAND}')
         if macros:
@@ -128,7 +128,7 @@ class Elements:
             )
 
     def _named(self, kind: str, read: Callable[[str, Element], T]) -> dict[str, T]:
-        """The root's elements of one kind by name; ModelError where two have the same name."""
+        """Return the root's elements of one kind by name; ModelError for duplicate names."""
         found: dict[str, T] = {}
         for element in self.file.children(self.file.root, kind):
             name = self.file.text(element, "name")
@@ -144,7 +144,7 @@ class Elements:
         return found
 
     def _pose(self, origin: Element | None, owner: Element) -> tuple[np.ndarray, Sequence[float]]:
-        """Rotation and position that an <origin> gives; the identity where there is none."""
+        """Return rotation and position of an <origin>; the identity if there is none."""
         if origin is None:
             return _IDENTITY, _ZERO
         position = self.file.numbers(origin, "xyz", 3, owner, _ZERO)
@@ -155,7 +155,7 @@ class Elements:
             raise self.file.error(origin, f"{label(owner)}: <origin> has rpy and quat_xyzw; give one of them")
         quaternion = self.file.numbers(origin, "quat_xyzw", 4, owner)
         if not np.linalg.norm(quaternion) > 1e-8:
-            raise self.file.error(origin, f"{label(owner)}: <origin> quat_xyzw has length 0; no rotation is 0 0 0 1")
+            raise self.file.error(origin, f"{label(owner)}: <origin> quat_xyzw has length 0; the identity is 0 0 0 1")
         return rotation_from_quaternion(np.roll(quaternion, 1)), position
 
     # ------------------------------------------------------------------ links
@@ -202,7 +202,7 @@ class Elements:
         )
 
     def _leave_aside(self, name: str, element: Element, parts: dict[str, Element]) -> None:
-        """What the file says of a joint that a model does not have: numbers above zero of damping, friction and bounds."""
+        """Store data of a joint that a model does not have: positive values of damping, friction and bounds."""
         for tag, quantities in _LEFT_ASIDE.items():
             if (inner := parts.get(tag)) is None:
                 continue
@@ -239,7 +239,7 @@ class Elements:
             text = f"its lower limit {lower:g} lies above the upper one {upper:g}; both are left out"
             self.warnings.append(f"{self.file.at(limit)}: {label(element)}: {text}")
             return None
-        # The largest double is how a side without a limit is written where a reader takes finite numbers alone.
+        # The largest double stands for a missing limit if a reader accepts only finite numbers.
         lower, upper = (-math.inf if lower <= -_LARGEST else lower), (math.inf if upper >= _LARGEST else upper)
         return None if math.isinf(lower) and math.isinf(upper) else (lower, upper)
 

@@ -1,4 +1,4 @@
-"""Loops of a URDF file: elements `<loop>` in a `<pycraft>` of the robot, which other readers pass over (docs/models.md, docs/loops.md).
+"""Loops of a URDF file: elements `<loop>` in a `<pycraft>` of the robot, which other readers ignore (docs/models.md, docs/loops.md).
 
     <pycraft>
       <loop name="closure" kind="pin" a="ground" b="rocker" xyz="1 0 0" axis="0 0 1"/>
@@ -8,10 +8,10 @@
       <loop name="slot" kind="custom" b="rocker"><subhinge kind="slider" axis="1 0 0"/> <subhinge kind="pin" axis="0 0 1"/></loop>
     </pycraft>
 
-a and b are links, the root link where one is not given. Of a hinge the arguments of `Multibody.add_loop`: axis (three numbers an axis),
-point, pitch, and the placement as xyz and rpy; of a custom one the placement and its subhinges; of "wheel" and "rolling ball"
-the radius; of "surface" quadratic (nine), linear and constant; of "curve" parameters, closed (1 or 0), and coefficients, three numbers of
-each power of each piece in turn; of "coupling" coordinates with coefficients of 1, q, q², ..., and constant.
+a and b are links, default: the root link. For a hinge the arguments of `Multibody.add_loop`: axis (three numbers per axis), point, pitch,
+and the placement as xyz and rpy; for a custom one the placement and its subhinges; for "wheel" and "rolling ball" the radius; for "surface"
+quadratic (nine), linear and constant; for "curve" parameters, closed (1 or 0), and coefficients, three numbers for each power of each piece
+in turn; for "coupling" coordinates with coefficients of 1, q, q², ..., and constant.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ KEYS: dict[str, tuple[str, ...]] = {kind: ("a", "b", *_HINGE) for kind in _core.
 
 
 def add_loops(file: XmlFile, model: Multibody, root: str) -> None:
-    """Declares every loop of a file. `root`: its root link. ModelError with file, line, loop and attribute."""
+    """Declare every loop of a file. `root`: its root link. ModelError with file, line, loop and attribute."""
     for ours in file.children(file.root, "pycraft"):
         if ours.attrib:
             raise file.error(

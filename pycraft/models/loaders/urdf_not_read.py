@@ -1,4 +1,4 @@
-"""What a URDF file says to other programs that changes the motion there, in words: Gazebo's tags, Drake's, controllers."""
+"""Elements of a URDF file that change the motion in other programs, in words: Gazebo's tags, Drake's, controllers."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _SILENT = {
     "laser_retro",
     "light",
 }
-"""Elements of <gazebo> that move nothing."""
+"""Elements of <gazebo> that do not affect motion."""
 _OFF = {"turnGravityOff": ("false", "0"), "gravity": ("true", "1"), "kinematic": ("false", "0"), "static": ("false", "0")}
-"""Values with which elements of <gazebo> change nothing."""
+"""Values with which elements of <gazebo> have no effect."""
 _ROTOR = ("rotor_inertia", "motorInertia", "rotorInertia")
 
 
@@ -35,7 +35,7 @@ _WITHIN = etree.XPath(
 def not_read(file: XmlFile) -> list[str]:
     """Return the elements of the file that change the motion elsewhere and are not read, each in words."""
     found: list[str] = []
-    for element in _ASIDE(file.root):  # by expressions: a large file has links and joints by the million
+    for element in _ASIDE(file.root):  # by XPath: a large file has millions of links and joints
         name = _plain(element)
         if name == "gazebo":
             found += _of_gazebo(element)
@@ -61,7 +61,7 @@ def _of_gazebo(element: Element) -> Iterable[str]:
 
 
 def _plain(element: Element) -> str:
-    """The name without its prefix, which old files use undeclared."""
+    """Return the name without its prefix, which old files use undeclared."""
     return local_name(element).rpartition(":")[2]
 
 

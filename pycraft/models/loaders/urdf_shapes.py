@@ -1,4 +1,4 @@
-"""The visuals and collisions of a URDF file as shapes: <origin>, <geometry>, <material>. A wrong one is left out with a warning."""
+"""The visuals and collisions of a URDF file as shapes: <origin>, <geometry>, <material>. Invalid ones are omitted with a warning."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def shapes_of(file: XmlFile, elements: Elements, package_dirs: Iterable[Any]) ->
     colours = {material.get("name", ""): colour for material in file.children(file.root, "material") if (colour := _colour(file, material))}
     found: list[Shape] = []
     warnings: list[str] = []
-    if next(file.root.iter("{*}visual", "{*}collision"), None) is None:  # a large file that shows nothing
+    if next(file.root.iter("{*}visual", "{*}collision"), None) is None:  # a large file without shapes
         return found, warnings
     for name, link in elements.links.items():
         for purpose in ("visual", "collision"):
@@ -40,7 +40,7 @@ def shapes_of(file: XmlFile, elements: Elements, package_dirs: Iterable[Any]) ->
 
 
 def beside_of(file: XmlFile, package_dirs: Iterable[Any]) -> tuple[str, tuple[str, ...]]:
-    """Return where meshes of a file are looked for: its own path, and the folders of packages, absolute."""
+    """Return the search path of a file's meshes: its own path, and the folders of packages, absolute."""
     folders = [package_dirs] if isinstance(package_dirs, (str, bytes, os.PathLike)) else package_dirs
     try:
         return os.path.abspath(os.fsdecode(file.path)), tuple(os.path.abspath(os.fsdecode(folder)) for folder in folders)

@@ -1,4 +1,4 @@
-"""An XML file being read: its root element, numbers from attributes, and errors that say file, line and element."""
+"""Read an XML file: its root element, numbers from attributes, and errors with file, line and element."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class XmlFile:
     ----------
     path : str
     root : the root element; its local name is `root_name`
-    warnings : what the parser is told to overlook, each text with file and line
+    warnings : faults that the parser ignores, each text with file and line
 
     Raises
     ------
     ModelError
-        A file that is not there or cannot be read; XML that is not well formed (with its line); entities of its own.
+        A missing or unreadable file; XML that is not well formed (with its line); entities of its own.
     """
 
     def __init__(self, path: str | os.PathLike[str]):
@@ -43,20 +43,20 @@ class XmlFile:
         self.warnings: list[str] = []
         self.root, parser = self._parse(data)
         self.root_name, self._space = local_name(self.root), _namespace(self.root)
-        # Expressions of macros may hide in any element and attribute; whether there can be any is seen from the bytes.
+        # Expressions of macros may be in any element and attribute; the bytes show whether there can be any.
         self.may_have_macros = not data.isascii() or any(mark in data for mark in (b"xacro", b"${", b"$(", b"&#", b"\x00"))
         dtd = self.root.getroottree().docinfo.internalDTD
         entities = [entity.name for entity in dtd.iterentities()] if dtd is not None else []
         if entities:
             text = f"the file declares entities ({', '.join(entities)}), which are not expanded; write their text out"
             raise self.error(self.root, text)
-        for entry in parser.error_log:  # only a warning where a DOCTYPE speaks of declarations elsewhere; nothing is put in their place
+        for entry in parser.error_log:  # only a warning if a DOCTYPE refers to external declarations; nothing replaces them
             if "UNDECLARED_ENTITY" in entry.type_name:
                 text = f"{entry.message}: entities are not expanded; write its text out"
                 raise _core.ModelError(f"{self.path}:{entry.line}: {text}")
 
     def _parse(self, data: bytes) -> tuple[Element, etree.XMLParser]:
-        # Files come from anywhere: nothing is fetched, no entity is expanded, the parser's limits on depth and size stay.
+        # Files are untrusted: nothing is fetched, no entity is expanded, the parser's limits on depth and size stay.
         options = dict(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
         options |= dict(remove_comments=True, remove_pis=True)
         data = self._repaired(data)
@@ -78,7 +78,7 @@ class XmlFile:
             raise _core.ModelError(f"{self.path}{line}: not well-formed XML: {text}{remedy}") from None
 
     def _repaired(self, data: bytes) -> bytes:
-        """The file as the parser takes it: without text before the XML declaration, and with a version that exists."""
+        """Return the file in a form that the parser accepts: no text before the XML declaration, and a version that exists."""
         bom = data[:3] if data.startswith(b"\xef\xbb\xbf") else b""
         body = data[len(bom) :]
         declaration = _DECLARATION.search(body)
@@ -104,26 +104,25 @@ class XmlFile:
 
     # ------------------------------------------------------------------ errors
     def at(self, element: Element) -> str:
-        """Where an element is: file:line."""
+        """Return the location of an element: file:line."""
         return f"{self.path}:{element.sourceline}"
 
     def error(self, element: Element, text: str) -> Exception:
-        """A ModelError to raise: "file:line: text"."""
+        """Return a ModelError to raise: "file:line: text"."""
         return _core.ModelError(f"{self.at(element)}: {text}")
 
     # ------------------------------------------------------------------ elements
     def children(self, element: Element, name: str) -> list[Element]:
-        """Children of that name, in the root's namespace (if it has one)."""
+        """Return the children of that name, in the root's namespace (if it has one)."""
         return element.findall(f"{{{self._space}}}{name}" if self._space else name)
 
     def parts(self, element: Element, names: frozenset[str]) -> dict[str, Element]:
-        """The children by name, those of these names among them.
+        """Return the children with these names, by name.
 
-        One that is repeated word for word counts once, with a warning; ModelError for several of a name that differ, as it is not clear
-        which counts.
+        An exact repetition counts once, with a warning; ModelError for different children of one name, since it is unclear which counts.
         """
         found: dict[str, Element] = {child.tag: child for child in element}
-        if not self._space and len(found) == len(element):  # most have one of each, and a large file has them by the million
+        if not self._space and len(found) == len(element):  # most elements have one of each, and a large file has millions
             return found
         found.clear()
         for child in element:
@@ -144,7 +143,7 @@ class XmlFile:
         return found
 
     def required(self, parts: dict[str, Element], name: str, element: Element, owner: Element, remedy: str) -> Element:
-        """That one of the parts of an element; ModelError, naming the link or joint `owner`, if there is none."""
+        """Return this part of an element; ModelError, naming the link or joint `owner`, if there is none."""
         found = parts.get(name)
         if found is None:
             raise self.error(element, f"{label(owner)} has no <{name}>; {remedy}")
@@ -152,7 +151,7 @@ class XmlFile:
 
     # ------------------------------------------------------------------ attributes
     def text(self, element: Element, attribute: str, owner: Element | None = None) -> str:
-        """An attribute that must be there and not empty."""
+        """Return an attribute that must exist and not be empty."""
         value = (element.get(attribute) or "").strip()
         if not value:
             of = f" of {label(owner)}" if owner is not None else ""
@@ -169,30 +168,30 @@ class XmlFile:
         default: Sequence[float] | None = None,
         infinite: bool = False,
     ) -> Sequence[float]:
-        """Numbers of an attribute, separated by blanks.
+        """Return the numbers of an attribute, separated by blanks.
 
         Parameters
         ----------
-        count : how many there must be; None: at least one
+        count : required count; None: at least one
         owner : the link or joint that the element belongs to, for the error
-        default : returned where the attribute is absent; with None it must be there
-        infinite : whether "inf" is a number; "nan" never is
+        default : returned if the attribute is absent; None: the attribute is required
+        infinite : whether "inf" is allowed; "nan" never is
 
         Raises
         ------
         ModelError
-            A wrong count, or a word that is no finite number: says file, line, owner, element, attribute and the word.
+            A wrong count, or a word that is not a finite number: names file, line, owner, element, attribute and the word.
         """
         value = element.get(attribute)
         if value is None and default is not None:
             return default
-        numbers = _plain_numbers(value)  # most are as they should be
+        numbers = _plain_numbers(value)  # most are valid
         if len(numbers) == count:
             return numbers
         return self._floats(element, attribute, value, count, owner, infinite)
 
     def number(self, element: Element, attribute: str, owner: Element, default: float | None = None, infinite: bool = False) -> float:
-        """One number of an attribute: see `numbers`."""
+        """Return one number of an attribute: see `numbers`."""
         value = element.get(attribute)
         if value is None and default is not None:
             return default
@@ -210,7 +209,7 @@ class XmlFile:
                 numbers = list(map(float, words))
             except ValueError:
                 numbers = [math.nan]
-            # Digits of other scripts and 1_000 are numbers to Python alone.
+            # Only Python accepts digits of other scripts and 1_000 as numbers.
             as_written = value is not None and value.isascii() and "_" not in value
             if as_written and (all(map(math.isfinite, numbers)) or (infinite and not any(map(math.isnan, numbers)))):
                 return numbers
@@ -219,7 +218,7 @@ class XmlFile:
     def _no_numbers(
         self, element: Element, attribute: str, value: str | None, words: list[str], count: int | None, owner: Element, infinite: bool
     ) -> Exception:
-        """What is wrong with an attribute that is not so many numbers."""
+        """Return the error for an attribute that does not have that many numbers."""
         where = f"{label(owner)}: <{local_name(element)}> {attribute}"
         if value is None:
             return self.error(element, f"{where} is missing; write it")
@@ -233,21 +232,21 @@ class XmlFile:
         return self.error(element, f'{where}="{value}": {word!r} is not a number; write {wanted}, with a decimal point')
 
 
-@lru_cache(maxsize=1 << 12)  # a large file has numbers by the million, and most of them many times
+@lru_cache(maxsize=1 << 12)  # a large file has millions of numbers, most of them repeated
 def _plain_numbers(value: str | None) -> tuple[float, ...]:
-    """The finite numbers of an attribute; none of them where it is absent or any of it is something else."""
+    """Return the finite numbers of an attribute; empty if it is absent or any word of it is something else."""
     if value is None:
         return ()
     try:
         numbers = tuple(map(float, value.split()))
     except ValueError:
         return ()
-    # Digits of other scripts and 1_000 are numbers to Python alone.
+    # Only Python accepts digits of other scripts and 1_000 as numbers.
     return numbers if all(map(math.isfinite, numbers)) and value.isascii() and "_" not in value else ()
 
 
 def _float(word: str) -> float:
-    """The number that a word is; NaN for none."""
+    """Return the number that a word stands for; NaN for none."""
     try:
         return float(word) if word.isascii() and "_" not in word else math.nan
     except ValueError:
@@ -255,13 +254,13 @@ def _float(word: str) -> float:
 
 
 def same_elements(one: Element, other: Element) -> bool:
-    """Whether two elements have the same name, attributes and contents, blanks aside."""
+    """Check that two elements have the same name, attributes and contents, apart from blanks."""
     same = one.tag == other.tag and dict(one.attrib) == dict(other.attrib) and (one.text or "").split() == (other.text or "").split()
     return same and len(one) == len(other) and all(map(same_elements, one, other))
 
 
 def local_name(element: Element) -> str:
-    """The tag without its namespace. (QName refuses what a prefix that was never declared leaves in a tag.)"""
+    """Return the tag without its namespace. (QName refuses tags with a prefix that was never declared.)"""
     return element.tag.rpartition("}")[2]
 
 
@@ -270,12 +269,12 @@ def _namespace(element: Element) -> str:
 
 
 def abbreviated(items: Iterable[str], between: str = ", ", most: int = 12) -> str:
-    """A list for an error: in full if it is short, else its beginning and how many there are."""
+    """Return a list for an error: in full if it is short, else its beginning and the number of items."""
     items = list(items)
     return between.join(items if len(items) <= most else [*items[:most], f"... ({len(items)} in all)"])
 
 
 def label(element: Element) -> str:
-    """How errors call an element: link 'forearm', joint 'elbow', or <robot> where it has no name."""
+    """Return the name of an element in errors: link 'forearm', joint 'elbow', or <robot> without a name."""
     name, kind = element.get("name"), local_name(element)
     return f"{kind} {name!r}" if name else f"<{kind}>"

@@ -1,4 +1,4 @@
-"""Robots that come with the package: small models without meshes, their numbers from published sources (docs/robots.md)."""
+"""Robots that come with the package: small models without meshes, with parameters from published sources (docs/robots.md)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..multibody import Multibody
 
 
 def names() -> list[str]:
-    """The names of the robots: each is a function of this module.
+    """Return the names of the robots: each is a function of this module.
 
     Examples
     --------
@@ -24,7 +24,7 @@ def puma560(*, root: str = "fixed", welds: str = "lump") -> Multibody:
     """Unimation PUMA 560, arm of 6 hinges (nv 6), with rotor inertias.
 
     Source: Armstrong, Khatib and Burdick 1986, Corke and Armstrong-Hélouvry 1994, as tabulated in robotics-toolbox-python.
-    Link 1 has an inertia about its axis only and link 3 misses the triangle inequality, both as published.
+    Link 1 has an inertia about its axis only and link 3 violates the triangle inequality, both as published.
     """
     return _shipped("puma560", root, welds)
 
@@ -63,6 +63,6 @@ def g1(*, root: str = "free", welds: str = "lump") -> Multibody:
 
 def _shipped(name: str, root: str, welds: str) -> Multibody:
     with as_file(files(__package__) / f"{name}.urdf") as path:
-        # What there is to warn of, violations in the PUMA's published numbers, is kept on purpose and told in docs/robots.md.
+        # Warnings, about violations in the PUMA's published values, are suppressed on purpose; docs/robots.md explains them.
         model, _ = read(path, root=root, welds=welds)
     return model

@@ -1,4 +1,4 @@
-"""Models to files: TOML for every model, URDF and MJCF for what they know."""
+"""Write models to files: TOML for every model, URDF and MJCF for the features that they have."""
 
 from .save import save
 

@@ -1,4 +1,4 @@
-"""Loops of a model as equality constraints of MJCF that `loaders.mjcf_equalities` reads, as far as MJCF has them.
+"""Loops of a model as equality constraints of MJCF that `loaders.mjcf_equalities` reads, if MJCF has them.
 
 loop                                                          equality
 ball, or gimbal                                               connect, of two sites at its point
@@ -6,7 +6,7 @@ weld                                                          weld, of two sites
 coupling of one or two joints of one coordinate, linear in
 one of them and of degree four at most in the other           joint
 
-Sites are where ends stand: a node of that pose, or one more, called "loop: a" and "loop: b".
+Sites are at the ends: a node of that pose, or a new one, called "loop: a" and "loop: b".
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def add_equalities(model: Multibody, described: dict[str, Any], root: Any, elements: list[Any], joints: dict[str, str]) -> list[str]:
-    """Adds `<equality>` to a file, and says what it has no place for. `joints`: those of one coordinate, by the coordinate's name."""
+    """Add `<equality>` to a file, and return loops without one. `joints`: those of one coordinate, by the coordinate's name."""
     from lxml import etree
 
     section, sites, unsaid = etree.Element("equality"), _Sites(described, root, elements), []
@@ -43,7 +43,7 @@ def add_equalities(model: Multibody, described: dict[str, Any], root: Any, eleme
 
 
 def _joint(model: Multibody, loop: dict[str, Any], joints: dict[str, str]) -> dict[str, str] | None:
-    """The attributes of q₁ = Σ a_k q₂^k; None where the coupling is no such."""
+    """Return the attributes of q₁ = Σ a_k q₂^k; None if the coupling does not have this form."""
     if loop["kind"] != "coupling" or loop.get("function") is not None:
         return None
     names = [joints.get(model.coordinate_names[i]) for i in model.loops.coupled(loop["name"])]
@@ -61,7 +61,7 @@ def _joint(model: Multibody, loop: dict[str, Any], joints: dict[str, str]) -> di
 
 
 class _Sites:
-    """Sites at poses on bodies, nodes', which are there, or new ones."""
+    """Sites at poses on bodies, those of nodes, which exist, or new ones."""
 
     def __init__(self, described: dict[str, Any], root: Any, elements: list[Any]):
         self.carriers = [*elements, root.find("worldbody")]  # -1: the base
@@ -72,7 +72,7 @@ class _Sites:
             self.poses[node["name"]] = (node["body"], _pose(node["rotation"], node["position"]))
 
     def of_ends(self, loop: dict[str, Any]) -> tuple[str, str]:
-        """The names of the sites on a and on b that fall together where the loop is closed."""
+        """Return the names of the sites on a and on b that coincide when the loop is closed."""
         placement, at = _pose(loop["rotation"], loop["position"]), _pose(None, loop["point"])
         return self._site(loop["a"], placement @ at, f"{loop['name']}: a"), self._site(loop["b"], at, f"{loop['name']}: b")
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def loops_element(model: Multibody, described: dict[str, Any], root: str) -> Element | None:
-    """`<pycraft>` with a `<loop>` each, those by functions left out; None for none. `root`: the root link, which is the base."""
+    """Return `<pycraft>` with a `<loop>` for each, except those by functions; None if empty. `root`: the root link, which is the base."""
     from lxml import etree
 
     loops = [loop for loop in described.get("loops", []) if loop.get("function") is None]
@@ -47,7 +47,7 @@ _NUMBERS = ("point", "quadratic", "linear", "radius", "pitch", "constant", "para
 
 
 def _numbers(loop: dict[str, Any]) -> dict[str, Any]:
-    """What a loop has beside its name, ends and coordinates, without zeros."""
+    """Return the data of a loop except its name, ends and coordinates, without zeros."""
     given: dict[str, Any] = {key: loop.get(key) for key in _NUMBERS}
     given["xyz"] = loop.get("position")
     if loop.get("axes"):

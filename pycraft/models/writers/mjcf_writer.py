@@ -1,4 +1,4 @@
-"""A model as MJCF, as far as MJCF has what the model has; `pycraft.load` reads it back to rounding, MuJoCo as it reads every file.
+"""Write a model as MJCF, if MJCF has its features; `pycraft.load` reads it back to rounding, MuJoCo like any file.
 
 hinge                                    joints of its body
 weld                                     none
@@ -7,11 +7,11 @@ free, on the base                        free
 universal, gimbal, cylindrical,
 planar, custom of pins and sliders       one a subhinge, called name[0], name[1], ..., read back as a custom hinge of that name
 
-Nodes are sites, rotor inertia is armature. The largest double stands for a side without a limit. Damping, friction, stiffness and where
-springs are slack, which a file before said, go back into joints, actuators into actuators; loops are equality constraints as far as
-MJCF has them (`equality_elements`); the state is a keyframe called "state". Shapes are geoms (`shape_elements`): those to be seen in group
-1, without contacts, collision shapes in group 3. Weights that are held are gravcomp, a fluid is in the options. MuJoCo's compiler is told
-to leave masses and inertias alone; those that are not diagonal it turns into principal axes.
+Nodes are sites, rotor inertia is armature. The largest double stands for a side without a limit. Damping, friction, stiffness and rest
+positions of springs, from an earlier file, go back into joints, actuators into actuators; loops are equality constraints if MJCF has them
+(`equality_elements`); the state is a keyframe called "state". Shapes are geoms (`shape_elements`): visible ones in group 1, without
+contacts, collision shapes in group 3. Compensated weights are gravcomp, a fluid is in the options. MuJoCo's compiler is set to keep masses
+and inertias; it turns inertias that are not diagonal into principal axes.
 """
 
 from __future__ import annotations
@@ -38,25 +38,25 @@ if TYPE_CHECKING:
     from ..multibody import Multibody
 
 LEAST = 1e-15
-"""MuJoCo's mjMINVAL: less mass or inertia than this it takes for none."""
+"""MuJoCo's mjMINVAL: a smaller mass or inertia counts as none."""
 ROUNDING = 16 * np.finfo(float).eps
-"""Over the largest moment: what rounding makes of the triangle inequality of a flat body."""
+"""Relative to the largest moment: rounding in the triangle inequality of a flat body."""
 _JOINT_KEYS = {"damping": "damping", "friction": "frictionloss", "stiffness": "stiffness"}
 _NO_LIMIT = sys.float_info.max
 
 
 def model_text(model: Multibody, path: str, state: bool) -> str:
-    """The file's text. `path`: where it goes, for what is said about it.
+    """Return the file's text. `path`: its destination, for messages.
 
     Raises
     ------
     ModelError
-        Hinges, limits, inertias and names that MJCF does not have: names them, and says what to do.
+        Hinges, limits, inertias and names that MJCF does not have: names them, and the remedy.
 
     Warns
     -----
     ModelWarning
-        What the model has beside that and MJCF does not hold.
+        Further data of the model that MJCF does not hold.
     """
     from lxml import etree
 
@@ -90,7 +90,7 @@ def model_text(model: Multibody, path: str, state: bool) -> str:
     return f"<!-- Written by PyCraft. SI units and radians. -->\n{etree.tostring(root, encoding='unicode')}\n"
 
 
-# What MJCF does not have ----------------------------------------------------------------------------------------------
+# Features that MJCF lacks ----------------------------------------------------------------------------------------------
 
 
 def _refuse(model: Multibody, described: dict[str, Any], path: str) -> None:
@@ -115,7 +115,7 @@ def _refuse(model: Multibody, described: dict[str, Any], path: str) -> None:
 
 
 def _lacking(body: dict[str, Any]) -> str:
-    """What of a body's hinge MJCF has not; empty where it has all."""
+    """Return the feature of a body's hinge that MJCF lacks; empty if it has all."""
     hinge, kinds = body["hinge"], [s["kind"] for s in body["hinge"]["subhinges"]]
     name, sizes = f"hinge {hinge['name']!r}", [_core.subhinge_kinds[kind].nv for kind in kinds]
     if "screw" in kinds:
@@ -131,7 +131,7 @@ def _lacking(body: dict[str, Any]) -> str:
 
 
 def _heavy(bodies: list[dict[str, Any]], k: int) -> bool:
-    """Whether MuJoCo takes body k for one that may move: it, or what is welded to it, has mass and inertia about all axes."""
+    """Return whether MuJoCo accepts body k as one that may move: it, or a body welded to it, has mass and inertia about all axes."""
     if bodies[k]["mass"] >= LEAST and np.linalg.eigvalsh(bodies[k]["inertia"])[0] >= LEAST:
         return True
     welded = (i for i, body in enumerate(bodies) if body["parent"] == k and not body["hinge"]["subhinges"])
@@ -139,13 +139,14 @@ def _heavy(bodies: list[dict[str, Any]], k: int) -> bool:
 
 
 def _excess(inertia: np.ndarray) -> float:
-    """What the largest principal moment is above the sum of the others, over itself: negative but for flat and unreal bodies."""
+    """Return the excess of the largest principal moment over the sum of the others, relative to it: negative except for flat and impossible
+    bodies."""
     a, b, c = np.linalg.eigvalsh(inertia)
     return (c - a - b) / c if c else -1.0
 
 
 def _add_flat_inertia(body: dict[str, Any], element: Any) -> None:
-    """Of a flat body rounding is added to the moments: MuJoCo takes none that violate the triangle inequality, be it by rounding."""
+    """Write the moments of a flat body plus rounding: MuJoCo refuses a violation of the triangle inequality, even by rounding."""
     inertia = body["inertia"]
     if abs(_excess(inertia)) <= ROUNDING:
         element.find("inertial").set(*inertia_attribute(inertia + 2 * ROUNDING * np.trace(inertia) * np.eye(3)))
@@ -166,7 +167,7 @@ def _unsaid(described: dict[str, Any]) -> list[str]:
 
 
 def _add_shapes(model: Multibody, path: str, root: Any, described: dict[str, Any], elements: list[Any]) -> list[str]:
-    """Shapes are geoms that have no mass; returns those that MuJoCo does not read."""
+    """Write shapes as geoms without mass; return those that MuJoCo does not read."""
     made = MjcfShapes(root, path)
     owners = {body["name"]: (element, np.eye(4)) for body, element in zip(described["bodies"], elements, strict=True)}
     owners[""] = root.find("worldbody"), np.eye(4)
@@ -181,7 +182,7 @@ def _add_shapes(model: Multibody, path: str, root: Any, described: dict[str, Any
     return made.lost
 
 
-# What it has ----------------------------------------------------------------------------------------------------------
+# Features that it has ----------------------------------------------------------------------------------------------------------
 
 
 def _add_limits(hinge: dict[str, Any], element: Any) -> None:
@@ -194,7 +195,7 @@ def _add_limits(hinge: dict[str, Any], element: Any) -> None:
 
 
 def _add_left_aside(model: Multibody, root: Any, joints: list[Any]) -> list[str]:
-    """What an earlier file said beside the model goes into joints; what does not is told."""
+    """Write data beside the model from an earlier file into joints; report the rest."""
     unsaid = []
     for quantity, values in current(model).items():
         if quantity == "gravity":
@@ -221,7 +222,7 @@ def _add_left_aside(model: Multibody, root: Any, joints: list[Any]) -> list[str]
 
 
 def _add_offers(model: Multibody, root: Any, described: dict[str, Any], elements: list[Any]) -> list[str]:
-    """Add weights that are held at the centre of mass, and the fluid of the boxes of all bodies; return the names of the others."""
+    """Add compensated weights at the centre of mass, and the fluid of the boxes of all bodies; return the names of the others."""
     unsaid, bodies = [], {body["name"]: (body, element) for body, element in zip(described["bodies"], elements, strict=True)}
     boxes = [offer for offer in model.offers if isinstance(offer, BoxInFluid)]
     for offer in model.offers:
@@ -243,7 +244,7 @@ def _add_offers(model: Multibody, root: Any, described: dict[str, Any], elements
 
 
 def _places(joints: list[Any]) -> list[tuple[Any, slice, slice]]:
-    """Every joint with its places in q and v."""
+    """Return every joint with its places in q and v."""
     places, q, v = [], 0, 0
     for joint in joints:
         nq, nv = {"ball": (4, 3), "free": (7, 6)}.get(joint.get("type"), (1, 1))
@@ -253,7 +254,7 @@ def _places(joints: list[Any]) -> list[tuple[Any, slice, slice]]:
 
 
 def _add_actuators(model: Multibody, root: Any, of_coordinate: dict[str, str]) -> list[str]:
-    """Actuators on joints of one coordinate whose force is a straight line; the names of the others."""
+    """Add actuators on joints of one coordinate with an affine force; return the names of the others."""
     from lxml import etree
 
     section, unsaid = etree.Element("actuator"), []

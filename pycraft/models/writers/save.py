@@ -1,4 +1,4 @@
-"""Models to files: `save` looks at how the file's name ends."""
+"""Write models to files: the ending of the file's name selects the format."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def save(model: Multibody, path: str | os.PathLike[str], state: bool = True) -> 
 
 
 def path_text(path: str | os.PathLike[str], what: str) -> str:
-    """A path as a text. ModelError where it is none."""
+    """Return a path as a text. ModelError if it is not a path."""
     try:
         return os.fsdecode(path)
     except TypeError:
@@ -52,13 +52,13 @@ def path_text(path: str | os.PathLike[str], what: str) -> str:
 
 
 def write_text(shown: str, text: str) -> None:
-    """Write a file, which is replaced where it is there, whole or not at all. ModelError where it cannot be written."""
+    """Write a file, replacing an existing one, whole or not at all. ModelError if it cannot be written."""
     try:
         content, path = text.encode("utf-8"), os.path.realpath(shown)  # a symbolic link stays one
         new = not os.path.exists(path)
         beside = (new or os.path.isfile(path)) and os.access(os.path.dirname(path), os.W_OK)
-        with open(path, "ab" if beside else "wb") as file:  # what may not be written is not replaced either
-            if not beside:  # a pipe, a device, or a folder that takes no file
+        with open(path, "ab" if beside else "wb") as file:  # a file without write permission is not replaced either
+            if not beside:  # a pipe, a device, or a folder that accepts no new file
                 file.write(content)
         if beside:
             _replace(path, content, new)
@@ -69,7 +69,7 @@ def write_text(shown: str, text: str) -> None:
 
 
 def _replace(path: str, content: bytes, new: bool) -> None:
-    """By a file beside it that takes its place once it is written, with its permissions; a new one that fails is taken away."""
+    """Write a file beside it and move it into place, with its permissions; a new file that fails is removed."""
     number, beside = tempfile.mkstemp(dir=os.path.dirname(path), prefix=".saving-")
     try:
         with os.fdopen(number, "wb") as file:

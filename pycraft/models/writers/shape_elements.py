@@ -1,4 +1,4 @@
-"""Shapes as elements of URDF and MJCF files: primitives by their sizes, meshes by their files; what a format does not hold is named."""
+"""Shapes as elements of URDF and MJCF files: primitives by their sizes, meshes by their files; shapes without an element are named."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _MESHES_OF_MUJOCO = (".stl", ".obj", ".msh")
 _MOST_FACES = 200_000
 _PACKAGES = ("package://", "model://")
 HIDDEN_GROUP = 3
-"""The group of MuJoCo's geoms that its viewer does not show at first: collision shapes are in it."""
+"""The group of MuJoCo's geoms that its viewer hides by default: it holds collision shapes."""
 
 
 def lost_text(lost: Iterable[str]) -> str:
-    """What was not written, as a text: "2 × ellipsoid (URDF has none)"."""
+    """Return shapes that were not written, as a text: "2 × ellipsoid (URDF has none)"."""
     return ", ".join(f"{count} × {text}" if count > 1 else text for text, count in Counter(lost).items())
 
 
@@ -37,14 +37,14 @@ def lost_text(lost: Iterable[str]) -> str:
 
 
 class UrdfShapes:
-    """The elements of shapes for a URDF file at `path`; `lost` gathers what URDF does not hold."""
+    """The elements of shapes for a URDF file at `path`; `lost` collects shapes that URDF does not have."""
 
     def __init__(self, path: str):
         self.folder = Path(path).absolute().parent
         self.lost: list[str] = []
 
     def elements(self, shapes: Iterable[Shape]) -> Iterator[Element]:
-        """A <visual> or <collision> for each shape that URDF has."""
+        """Yield a <visual> or <collision> for each shape that URDF has."""
         from lxml import etree
 
         for shape in shapes:
@@ -80,7 +80,8 @@ class UrdfShapes:
 
 
 def reference(shape: Shape, folder: Path) -> str:
-    """How a file in a folder refers to the file of a mesh: by its package as before, else by the path from there, if the mesh is found."""
+    """Return the reference of a file in a folder to a mesh file: by its package as before, else by the relative path, if the mesh is
+    found."""
     if shape.file.startswith(_PACKAGES):
         return "package://" + shape.file.partition("://")[2]
     try:
@@ -91,7 +92,7 @@ def reference(shape: Shape, folder: Path) -> str:
 
 
 def red_green_blue(colour: str) -> list[float]:
-    """The numbers from 0 to 1 of a text "#rrggbb"."""
+    """Return the values from 0 to 1 of a text "#rrggbb"."""
     return [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
 
 
@@ -99,7 +100,8 @@ def red_green_blue(colour: str) -> list[float]:
 
 
 class MjcfShapes:
-    """The geoms of shapes for an MJCF file at `path`, and their meshes in its `<asset>`; `lost` gathers what MuJoCo does not read."""
+    """The geoms of shapes for an MJCF file at `path`, and their meshes in its `<asset>`; `lost` collects shapes that MuJoCo does not
+    read."""
 
     def __init__(self, root: Element, path: str):
         self.root, self.folder = root, Path(path).absolute().parent
@@ -131,7 +133,7 @@ class MjcfShapes:
 
     @staticmethod
     def _size(shape: Shape) -> list[float]:
-        """Sizes as MuJoCo has them: half edges, half lengths."""
+        """Return sizes by MuJoCo's convention: half edges, half lengths."""
         if shape.kind == "box":
             return [x / 2 for x in shape.size]
         if shape.kind in ("cylinder", "capsule"):
@@ -139,7 +141,7 @@ class MjcfShapes:
         return list(shape.size)
 
     def _mesh(self, shape: Shape) -> str | None:
-        """The name of the mesh in the file's assets; None where MuJoCo cannot have it."""
+        """Return the name of the mesh in the file's assets; None if MuJoCo cannot read it."""
         if shape.triangles is not None:
             return self._asset(
                 id(shape.triangles[0]),
@@ -181,7 +183,7 @@ class MjcfShapes:
 
 
 def _is_binary_stl(path: Path) -> bool:
-    """Whether a file is binary STL as MuJoCo takes it: a head of 80 bytes, the number of triangles, 50 bytes for each."""
+    """Check that a file is binary STL as MuJoCo accepts it: a head of 80 bytes, the number of triangles, 50 bytes for each."""
     try:
         with open(path, "rb") as file:
             head = file.read(84)

@@ -1,6 +1,6 @@
-"""TOML as a person writes it: a vector on one line, tables as sections, every number to the last bit.
+"""Write TOML in a readable form: a vector on one line, tables as sections, every number to the last bit.
 
-Not by a package: tomli-w writes each number of a vector on a line of its own, and tomlkit is made to edit files that keep their look.
+No package does this: tomli-w writes each number of a vector on its own line, and tomlkit is for editing files in place.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 _LINE = 100
-"""Characters of a list of lists or tables that go on one line; a longer one has a line for each item."""
+"""Characters of a list of lists or tables that fit on one line; a longer one has a line per item."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -22,7 +22,7 @@ class Inline(dict):
 
 
 def document(data: Mapping[str, Any], place: tuple[str, ...] = ()) -> str:
-    """A table as TOML: values first, then tables as [place.key] and lists of tables as [[place.key]]."""
+    """Return a table as TOML: values first, then tables as [place.key] and lists of tables as [[place.key]]."""
     lines = [f"{key_text(key)} = {value_text(value)}" for key, value in data.items() if not _is_section(value)]
     parts = ["\n".join(lines)] if lines else []
     for key, value in data.items():
@@ -44,14 +44,14 @@ def _is_section(value: Any) -> bool:
 
 
 def key_text(key: str) -> str:
-    """A key, in quotes where it must be."""
+    """Return a key, in quotes if necessary."""
     return key if _BARE.fullmatch(key) else value_text(key)
 
 
 def value_text(value: Any) -> str:
-    """A text, a truth, a number, a list or an inline table."""
+    """Return a text, a truth value, a number, a list or an inline table."""
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # JSON's escapes are TOML's, but for this one
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # JSON's escapes are TOML's, except for this one
     if isinstance(value, (bool, np.bool_)):
         return "true" if value else "false"
     if isinstance(value, Mapping):
@@ -65,6 +65,6 @@ def value_text(value: Any) -> str:
 
 
 def _number_text(number: float) -> str:
-    """The shortest text that reads back as this double; whole numbers without a point, but for -0.0."""
+    """Return the shortest text that reads back as this double; integers without a point, except for -0.0."""
     text = repr(number)
     return text.removesuffix(".0") if text != "-0.0" else text

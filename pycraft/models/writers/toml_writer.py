@@ -1,6 +1,6 @@
-"""A model as the TOML text that `pycraft.load` reads back bit for bit (docs/models.md, Files).
+"""Write a model as the TOML text that `pycraft.load` reads back bit for bit (docs/models.md, Files).
 
-What is at its default is left out; which numbers those are is judged by their bits, so that -0.0 is written.
+Defaults are omitted; values are compared with defaults by their bits, so that -0.0 is written.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _HEAD = "# A model of PyCraft: SI units and radians. docs/models.md, Files, says what the keys mean.\n\n"
 _SILENT = {"bias": [0.0, 0.0, 0.0], "control": 0.0, "force range": [-np.inf, np.inf]}
 _ZERO, _Z = np.zeros(3), np.array([0.0, 0.0, 1.0])
-# Of each kind that is given axes: which of its subhinges have them, in order. (Of a plane the normal is given, the axis of the last.)
+# For each kind with axes: its subhinges with axes, in order. (For a plane the normal is given, the axis of the last.)
 _GIVEN_AXES = {
     "pin": (0,),
     "slider": (0,),
@@ -38,19 +38,19 @@ _GIVEN_AXES = {
 
 
 def model_text(model: Multibody, state: bool = True) -> str:
-    """The file's text; `state`: with q and v, as far as they are not zero."""
+    """Return the file's text; `state`: include nonzero q and v."""
     return f"{_HEAD}{document(model_data(model, state))}\n"
 
 
 def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
-    """The file's tables as plain data."""
+    """Return the file's tables as plain data."""
     described = model.description()
     bodies = described["bodies"]
     names = [body["name"] for body in bodies]
     data: dict[str, Any] = {"format": FORMAT, "name": described["name"]}
     if not same(described["gravity"], _ZERO):
         data["gravity"] = described["gravity"]
-    if described["welds"] != "lump" or any(not body["hinge"]["subhinges"] for body in bodies):  # locked hinges, say
+    if described["welds"] != "lump" or any(not body["hinge"]["subhinges"] for body in bodies):  # for instance locked hinges
         data["welds"] = "keep"
     if described["strict"]:
         data["strict"] = True
@@ -77,7 +77,7 @@ def model_data(model: Multibody, state: bool = True) -> dict[str, Any]:
 
 
 def same(numbers: Any, others: Any) -> bool:
-    """Whether these are the same doubles, bit for bit."""
+    """Check that these are the same doubles, bit for bit."""
     return np.asarray(numbers, float).tobytes() == np.asarray(others, float).tobytes()
 
 
@@ -113,7 +113,7 @@ def _node(node: dict[str, Any], names: list[str]) -> dict[str, Any]:
 
 
 def loop_data(model: Multibody, loop: dict[str, Any]) -> dict[str, Any]:
-    """A loop as plain data, by the keys that toml_loops reads."""
+    """Return a loop as plain data, by the keys that toml_loops reads."""
     data: dict[str, Any] = {"name": loop["name"], "kind": loop["kind"]} | {end: loop[end] for end in ("a", "b") if loop.get(end)}
     if loop["kind"] == "coupling":
         numbers = model.loops.coupled(loop["name"])
@@ -134,7 +134,7 @@ def loop_data(model: Multibody, loop: dict[str, Any]) -> dict[str, Any]:
 
 
 def _pose(pose: dict[str, Any]) -> dict[str, Any]:
-    """Position and rotation; three angles where they give the matrix to the last bit, else its rows."""
+    """Return position and rotation; three angles if they give the matrix to the last bit, else its rows."""
     data: dict[str, Any] = {}
     if not same(pose["position"], _ZERO):
         data["position"] = pose["position"]
@@ -145,7 +145,7 @@ def _pose(pose: dict[str, Any]) -> dict[str, Any]:
 
 
 def _axes(hinge: dict[str, Any]) -> dict[str, Any]:
-    """Axes, point and pitch, where the core makes the very subhinges from them; else the subhinges one by one."""
+    """Return axes, point and pitch, if the core makes exactly these subhinges from them; else the subhinges one by one."""
     kind, subhinges = hinge["kind"], hinge["subhinges"]
     if kind != "custom":
         axes = [subhinges[i]["axis"] for i in _GIVEN_AXES.get(kind, ())]
@@ -159,7 +159,7 @@ def _axes(hinge: dict[str, Any]) -> dict[str, Any]:
 
 
 def made_by(kind: str, axes: list[Any], point: Any = None, pitch: float = 0.0) -> list[dict[str, Any]]:
-    """The subhinges that the core makes of a hinge of this kind, which is not "custom"."""
+    """Return the subhinges that the core makes for a hinge of this kind, which is not "custom"."""
     trial = _core.Multibody("trial", True, False)
     trial._add_body("trial", "", kind, "", axes, point, pitch, None, None, None, 0.0, None, None, None, None, None)
     return trial._body(0)["hinge"]["subhinges"]
@@ -182,7 +182,7 @@ def _subhinge(subhinge: dict[str, Any]) -> Inline:
 
 
 def state_data(model: Multibody) -> dict[str, Any]:
-    """q and v by the names of hinges, without those that are at zero."""
+    """Return q and v by the names of hinges, without hinges at zero."""
     parts = {"q": _positions(model, model.q)}
     parts["v"] = _by_hinge({name: hinge.v_slice for name, hinge in model.hinges.items()}, model.v, np.zeros(model.nv))
     return {key: part for key, part in parts.items() if part}
@@ -198,7 +198,7 @@ def _by_hinge(slices: dict[str, slice], numbers: np.ndarray, zero: np.ndarray) -
 
 
 def _left_aside(model: Multibody) -> dict[str, Any]:
-    """By quantity and coordinate, NaN left out; where springs are slack by hinge, as positions are."""
+    """Return data by quantity and coordinate, without NaN; rest positions of springs by hinge, as positions are."""
     data: dict[str, Any] = {}
     for quantity, values in current(model).items():
         if quantity == "gravity":
@@ -211,7 +211,7 @@ def _left_aside(model: Multibody) -> dict[str, Any]:
 
 
 def _actuator(actuator: dict[str, Any]) -> dict[str, Any]:
-    """The keys of `Multibody.actuators` as TOML's, without those that say nothing."""
+    """Return the keys of `Multibody.actuators` as TOML's, without defaults."""
     data: dict[str, Any] = {"name": actuator["name"]}
     for key in ("coordinate", "gear", "gain", "bias", "control", "force range", "why not"):
         value = actuator.get(key)
@@ -221,7 +221,7 @@ def _actuator(actuator: dict[str, Any]) -> dict[str, Any]:
 
 
 def _shape(shape: Shape) -> dict[str, Any]:
-    """A mesh is looked for where it was: the path of its model's file is written whole."""
+    """Return a shape; the search path of a mesh is written as absolute paths."""
     data: dict[str, Any] = {"kind": shape.kind}
     if shape.body:
         data["body"] = shape.body

@@ -1,17 +1,17 @@
-"""A model as URDF, as far as URDF has what the model has; `pycraft.load` reads it back to rounding.
+"""Write a model as URDF, if URDF has its features; `pycraft.load` reads it back to rounding.
 
 hinge                        joint
-pin                          revolute where a side has a limit, else continuous
+pin revolute if a side has a limit, else continuous
 slider                       prismatic
 weld                         fixed
 free                         floating
 planar, its own axes         planar
 
-A joint's axis passes through its child link's origin. Where a pin's axis misses its body's origin, the joint carries a link "..._at_hinge"
-whose origin is the pin's point and which has the body's mass; the body's own frame is fixed to it, a massless link of the body's name.
-Nodes are massless links on fixed joints. Bodies on the base hang on a massless root link, called "world" if no node of the base is at its
-origin. A side without a limit is the largest double, which every reader takes; `pycraft.load` reads it as none. Bounds on efforts and
-velocities that nobody gave are 0, which readers take for "unknown". Rotor inertia and loops stand in our own elements (see `loaders.urdf`).
+A joint's axis passes through its child link's origin. If a pin's axis misses its body's origin, the joint carries a link "..._at_hinge"
+with its origin at the pin's point and the body's mass; the body's own frame is fixed to it, a massless link of the body's name. Nodes are
+massless links on fixed joints. Bodies on the base are on a massless root link, called "world" unless a node of the base is at its origin. A
+side without a limit is the largest double, which every reader accepts; `pycraft.load` reads it as none. Unknown bounds on efforts and
+velocities are 0, which readers interpret as "unknown". Rotor inertia and loops are in our own elements (see `loaders.urdf`).
 """
 
 from __future__ import annotations
@@ -45,17 +45,17 @@ _NO_LIMIT = sys.float_info.max
 
 
 def model_text(model: Multibody, path: str) -> str:
-    """The file's text. `path`: where it goes, for what is said about it.
+    """Return the file's text. `path`: its destination, for messages.
 
     Raises
     ------
     ModelError
-        Hinges, limits and names that URDF does not have: names them, and says what to do.
+        Hinges, limits and names that URDF does not have: names them, and the remedy.
 
     Warns
     -----
     ModelWarning
-        What the model has beside hinges and bodies and URDF does not hold: gravity, a state, stiffnesses that were left aside.
+        Further data of the model that URDF does not hold: gravity, a state, stiffnesses in `left_aside`.
     """
     from lxml import etree
 
@@ -81,7 +81,7 @@ def model_text(model: Multibody, path: str) -> str:
     return head + etree.tostring(robot, encoding="unicode") + "\n"
 
 
-# What URDF does not have ----------------------------------------------------------------------------------------------
+# Features that URDF lacks ----------------------------------------------------------------------------------------------
 
 
 def _refuse(described: dict[str, Any], path: str) -> None:
@@ -96,7 +96,7 @@ def _refuse(described: dict[str, Any], path: str) -> None:
 
 
 def _lacking(hinge: dict[str, Any]) -> str:
-    """What of a hinge URDF has not; empty where it has all."""
+    """Return the feature of a hinge that URDF lacks; empty if it has all."""
     name, kinds = f"hinge {hinge['name']!r}", [s["kind"] for s in hinge["subhinges"]]
     limited = len(hinge["lower"]) and bool(np.isfinite([hinge["lower"], hinge["upper"]]).any())
     if hinge["kind"] == "planar":
@@ -111,7 +111,7 @@ def _lacking(hinge: dict[str, Any]) -> str:
 
 
 def not_xml(name: str) -> str:
-    """What of a name XML does not take; empty where it takes all."""
+    """Return the fault of a name that XML does not accept; empty if it is valid."""
     lacking = any(not (" " <= c or c in "\t\n\r") or c in "\ufffe\uffff" for c in name)
     return "has a character that XML does not have" if lacking else ""
 
@@ -125,7 +125,7 @@ def _unwritable(name: str) -> str:
 
 
 def _by_body(model: Multibody) -> dict[str, list[Shape]]:
-    """The shapes by the body or node that they are on; those on what was taken out belong to nothing."""
+    """Return the shapes by the body or node that they are on; shapes of removed bodies have none."""
     found: dict[str, list[Shape]] = {}
     there = {"", *model.bodies, *model.nodes}
     for shape in model._shapes:
@@ -143,11 +143,11 @@ def _unsaid(model: Multibody) -> list[str]:
     return said + [f"the {name} in left_aside" for name in ("gravity", "stiffness", "quadratic damping") if name in model.left_aside]
 
 
-# What it has ----------------------------------------------------------------------------------------------------------
+# Features that it has ----------------------------------------------------------------------------------------------------------
 
 
 def _joint_extras(model: Multibody) -> dict[str, dict[str, float]]:
-    """Damping, friction and bounds that were left aside, by hinge of one coordinate."""
+    """Return damping, friction and bounds in `left_aside`, by hinge of one coordinate."""
     extras: dict[str, dict[str, float]] = {}
     for quantity, values in current(model).items():
         if quantity not in ("damping", "friction", "effort limit", "velocity limit"):
@@ -161,7 +161,7 @@ def _joint_extras(model: Multibody) -> dict[str, dict[str, float]]:
 
 @dataclass
 class _Links:
-    """Links and joints of a model: `moved` is, by body, where the origin of the link that its hinge carries is in its frame."""
+    """Links and joints of a model: `moved` is, by body, the origin of the link on its hinge, in the body's frame."""
 
     described: dict[str, Any]
     extras: dict[str, dict[str, float]]
@@ -178,7 +178,7 @@ class _Links:
             self.carried.append(_unused(f"{body['name']}_at_hinge", self.links) if self.moved[-1].any() else body["name"])
 
     def _root(self) -> tuple[str, str]:
-        """The root link's name, and that of the body or node which it is; empty for neither."""
+        """Return the root link's name, and the name of the body or node that it represents; both are empty if there is none."""
         bodies, nodes = self.described["bodies"], self.described["nodes"]
         on_base = [body for body in bodies if body["parent"] < 0]
         fixed = [node["name"] for node in nodes if node["body"] < 0 and _is_origin(node)]
@@ -186,13 +186,13 @@ class _Links:
             return fixed[0], fixed[0]
         if len(on_base) == 1:
             name, hinge = on_base[0]["name"], on_base[0]["hinge"]
-            called_so = hinge["name"] in ("root", f"root of {name}")  # as `load` calls what it welds a kept root link by
+            called_so = hinge["name"] in ("root", f"root of {name}")  # the name that `load` gives to the weld of a kept root link
             if called_so and not hinge["subhinges"] and _is_origin(hinge["placement"]):
                 return name, name
         return _unused("world", self.links), ""
 
     def elements(self) -> Iterator[Element]:
-        """Links and joints, every link before the joint that carries it."""
+        """Yield links and joints, every link before the joint that carries it."""
         if all(self.root != body["name"] for body in self.described["bodies"]):
             yield _link(self.root)
         for k, body in enumerate(self.described["bodies"]):
@@ -237,7 +237,7 @@ class _Links:
 
 
 def _off_axis(hinge: dict[str, Any]) -> np.ndarray:
-    """The way from the body's origin to the axis that its hinge turns it about, zero for one that passes through the origin."""
+    """Return the vector from the body's origin to the rotation axis of its hinge, zero for an axis through the origin."""
     turning = [s for s in hinge["subhinges"] if s["kind"] == "pin"]
     if not turning or not turning[-1]["point"].any():
         return _ZERO
@@ -251,7 +251,7 @@ def _is_origin(pose: dict[str, Any]) -> bool:
 
 
 def _unused(name: str, taken: set[str]) -> str:
-    """The name, or the first of name_2, name_3, ... that nothing has; it is taken then."""
+    """Return the name, or the first of name_2, name_3, ... that is unused, and mark it as used."""
     free, i = name, 1
     while free in taken:
         i += 1
@@ -264,7 +264,7 @@ def _unused(name: str, taken: set[str]) -> str:
 
 
 def _link(name: str, body: dict[str, Any] | None = None, origin: np.ndarray = _ZERO) -> Element:
-    """A link; `origin` is where its origin is in the body's frame."""
+    """Return a link; `origin` is its origin in the body's frame."""
     from lxml import etree
 
     link = etree.Element("link", name=name)
@@ -292,7 +292,7 @@ def _joint(name: str, kind: str, parent: str, child: str, position: np.ndarray, 
 
 
 def _add_extras(joint: Element, kind: str, lower: float, upper: float, extras: dict[str, float]) -> None:
-    """Limits, bounds and damping, as far as a joint of this type has them."""
+    """Add limits, bounds and damping, if a joint of this type has them."""
     from lxml import etree
 
     if kind in ("revolute", "prismatic") or (kind == "continuous" and {"effort limit", "velocity limit"} & extras.keys()):

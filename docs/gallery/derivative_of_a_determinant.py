@@ -1,4 +1,4 @@
-"""ln det ℳ of an arm along its elbow, and the slope that the derivative of the expression gives at some points."""
+"""ln det ℳ of an arm along its elbow, with slopes at some points from the derivative of the expression."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,4 +1,4 @@
-"""What each body of a flying tree is felt as, in kg: outboard and inboard, with one body as the base and another, or any by the slider."""
+"""The inertia at which each body of a flying tree is felt, in kg: outboard and inboard, for two bases, or any with the slider."""
 
 import matplotlib.pyplot as plt
 

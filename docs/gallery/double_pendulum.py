@@ -1,4 +1,4 @@
-"""A double pendulum: coordinates, energies and their balance, with units; and the run as a page by itself."""
+"""A double pendulum: coordinates, energies and their balance, with units; and a page that plays the run."""
 
 import pycraft as pc
 

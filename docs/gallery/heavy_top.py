@@ -1,4 +1,4 @@
-"""A heavy top under gravity: its centre of mass goes round, and nods."""
+"""Precession and nutation of a heavy top under gravity: the path of its centre of mass."""
 
 import matplotlib.pyplot as plt
 import numpy as np

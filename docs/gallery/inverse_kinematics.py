@@ -1,4 +1,4 @@
-"""A hand taken to a point by inverse kinematics, before and after."""
+"""A hand moved to a point by inverse kinematics, before and after."""
 
 import matplotlib.pyplot as plt
 import numpy as np

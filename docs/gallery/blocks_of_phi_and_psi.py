@@ -1,4 +1,4 @@
-"""φ reaches every ancestor; ψ fades where free hinges let go: the norms of their blocks on a chain, and ψ's beside it: point at a block."""
+"""φ reaches every ancestor; ψ decays through free hinges: norms of their blocks on a chain, with the chain beside ψ on hover."""
 
 import matplotlib.pyplot as plt
 from matplotlib.colors import LogNorm

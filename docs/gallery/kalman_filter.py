@@ -1,4 +1,4 @@
-"""The articulated-body recursion as a Kalman filter and smoother: a track, its measurements, what is made of them."""
+"""The articulated-body recursion as a Kalman filter and smoother: a track, its measurements and its estimates."""
 
 import matplotlib.pyplot as plt
 import numpy as np

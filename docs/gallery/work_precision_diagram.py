@@ -1,4 +1,4 @@
-"""What an integrator's accuracy costs: one motion at many tolerances."""
+"""Error against time of integrators: one motion at many tolerances."""
 
 import pycraft as pc
 

@@ -1,4 +1,4 @@
-"""The mass matrix of a humanoid on a free base: limbs do not feel each other, so blocks between them are zero."""
+"""The mass matrix of a humanoid on a free base: blocks between different limbs are zero."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,4 +1,4 @@
-"""Twelve double pendulums released within a milliradian: together at first, then not."""
+"""Twelve double pendulums released within a milliradian: they stay together at first, then diverge."""
 
 import matplotlib.pyplot as plt
 import numpy as np

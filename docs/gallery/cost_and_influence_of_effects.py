@@ -1,4 +1,4 @@
-"""What each effect of a scene costs, and in the same colours what the motion is off by without it."""
+"""The cost of each effect of a scene and, in the same colours, the error of the motion without it."""
 
 import pycraft as pc
 

@@ -1,4 +1,4 @@
-"""The mass that the hand of a planar arm feels, in every direction, along a reach: one over the ellipse's radius squared."""
+"""The apparent mass of the hand of a planar arm in every direction, along a reach: the inverse square of the ellipse's radius."""
 
 import matplotlib.pyplot as plt
 import numpy as np

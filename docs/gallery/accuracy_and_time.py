@@ -1,4 +1,4 @@
-"""Every form of the articulated-inertia sweep on an arm with a heavy tip: error against time."""
+"""Accuracy against time for every form of the articulated-inertia sweep, on an arm with a heavy tip."""
 
 import pycraft as pc
 

@@ -1,4 +1,4 @@
-"""What a step of a scene is spent on, part by part and effect by effect."""
+"""The cost of a step of a scene, pass by pass and effect by effect."""
 
 import pycraft as pc
 

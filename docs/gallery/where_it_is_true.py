@@ -1,5 +1,0 @@
-"""Where a conjecture is true, over chains and trees, with and without rotors, of every kind of hinge."""
-
-import pycraft as pc
-
-pc.truth("Ω = Υ + ψ̃*Υ + Υψ̃", smallest_case=False).plot()
