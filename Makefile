@@ -14,6 +14,7 @@
 #   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
 #   make mutants                small wrong changes, which the tests must notice; writes tests/mutation.md (under an hour)
 #   make campaigns              refinement against 5000 models made to break it, expressions of all letters against NumPy (half an hour of one core)
+#   make campaign-guarded       the expressions again, 600 seeds (SEEDS=...), with guards around the memory of the core (Linux; hours of one core)
 #   make stability              the catalogue of hard cases in full, beside the peers; writes tests/accuracy/stability.md
 PYTHON ?= python3
 MODEL ?=
@@ -27,7 +28,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
 .PHONY: FORCE docs tour test test-cpp test-python test-peers test-browser check lab bench performance stability campaigns lint clean wheel mutants \
-        test-address test-undefined test-thread test-clang campaign-address
+        test-address test-undefined test-thread test-clang campaign-address campaign-guarded
 
 tour: .venv/installed
 	$(BIN)/pycraft tour $(MODEL)
@@ -119,6 +120,11 @@ stability: .venv/peers
 campaigns: .venv/tested
 	$(BIN)/python tests/campaigns/refinement.py --seeds 5000 --jobs $(JOBS) --verbose
 	$(BIN)/python tests/campaigns/expressions.py --seeds 1000 --jobs $(JOBS)
+
+# The same expressions with guards at the ends of what the installed core allocates, in place of a sanitized build.
+campaign-guarded: .venv/tested
+	mkdir -p build && $(CXX) -std=c++20 -O2 -Wall -Wextra -shared -fPIC -o build/guarded_memory.so tests/campaigns/guarded_memory.cpp
+	env LD_PRELOAD=$(abspath build/guarded_memory.so) $(BIN)/python tests/campaigns/expressions.py --seeds $(SEEDS) --jobs $(JOBS)
 
 lint: .venv/tested
 	$(BIN)/ruff check pycraft tests cpp docs/making docs/gallery
