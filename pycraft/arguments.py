@@ -64,7 +64,7 @@ def whole(value: Any, what: str) -> int:
             return operator.index(value)
     except TypeError:
         pass
-    raise _core.ModelError(f"{what}: a whole number, not {value!r}")
+    raise _core.ModelError(f"{what} must be a whole number, not {value!r}")
 
 
 def one_number(value: Any, what: str) -> float:
@@ -128,7 +128,7 @@ def name_of(name: Any, what: str, otherwise: str) -> str:
 def seed_of(seed: Any) -> np.random.Generator:
     """Return the random generator of a seed, or the generator given. ModelError if it is neither."""
     if not isinstance(seed, np.random.Generator) and whole(seed, "seed") < 0:
-        raise _core.ModelError(f"seed: a whole number from 0 on, or a numpy.random.Generator, not {seed!r}")
+        raise _core.ModelError(f"seed must be a whole number from 0 on, or a numpy.random.Generator, not {seed!r}")
     return np.random.default_rng(seed)
 
 

@@ -110,7 +110,7 @@ def peaucellier(long: float = 1.0, short: float = 0.4, crank: float = 0.35, angl
 
     Parameters
     ----------
-    long, short, crank : m, of 1 kg per metre; the pen is in reach only if 2 crank < long - short, or less
+    long, short, crank : m, of 1 kg per metre; 2 crank cos(angle/2) must lie between long - short and long + short
     angle : rad, of the crank from x
     """
     long, short, crank, angle = _numbers(long=long, short=short, crank=crank, angle=angle)

@@ -42,7 +42,7 @@ def put(blocks, k, block):
         (dict(J=put(J, 1, 1.0)), r"J of body 'twig' has the shape \(\)"),
         (dict(parents=[-1, 2, 0]), "body 1 of 'SKO model' has parent 2"),
         (dict(parents="abc"), "parents of 'SKO model' must be a list, not 'abc'"),
-        (dict(parents=[-1, 0.0, 1]), "parents of 'SKO model': a whole number, not 0.0"),
+        (dict(parents=[-1, 0.0, 1]), "parents of 'SKO model' must be a whole number, not 0.0"),
         (dict(names=["a", "a", "b"]), "names of 'SKO model': 3 different texts"),
         (dict(names=["a"]), "names of 'SKO model': 1 for 3 bodies"),
         (dict(H=3), "H of 'SKO model': a list with one block per body"),

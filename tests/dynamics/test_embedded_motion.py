@@ -1,6 +1,6 @@
 """Motions by independent coordinates against tree augmentation, published values and energy; choices that degrade; what is refused.
 
-Tolerances: a hundred times that of the steps, whose errors add up over the motion, where nothing else is said.
+Tolerances: a hundred times the steps' tolerance, because errors add up over the motion, unless stated otherwise.
 """
 
 import numpy as np

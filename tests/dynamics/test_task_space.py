@@ -232,7 +232,7 @@ def test_derivatives(name):
 
 
 def test_derivatives_with_rotors_and_of_the_operator():
-    """Of whole frames they are those of the operator Λ; rotor inertias are in Λ and not in what changes."""
+    """For whole frames they equal the derivatives of the operator Λ; rotor inertias are in Λ but not in its derivative."""
     model = MODELS["panda"]
     for hinge in model.hinges.values():
         hinge.rotor_inertia = 0.2

@@ -1,4 +1,4 @@
-"""Letters beyond the table of operators: definitions around a statement, those of the equations of motion, rates, nodes, determinants."""
+"""Letters beyond the table of operators: definitions around a statement, letters of the equations of motion, rates, nodes, determinants."""
 
 from pathlib import Path
 
@@ -199,7 +199,7 @@ def test_a_determinant_by_block_has_its_sign():
 @pytest.mark.parametrize("text", BY_BLOCK)
 def test_recursions_are_proved(text):
     if "path" in text or "outboard" in text:
-        with pytest.raises(ParseError, match="none of operators"):
+        with pytest.raises(ParseError, match="without a form in operators"):
             prove(text)
     else:
         assert prove(text) and not prove(text).hypotheses
@@ -216,7 +216,7 @@ def test_recursions_are_proved(text):
     ],
 )
 def test_what_is_no_statement_of_operators_is_not_proved_as_one(text):
-    with pytest.raises(ParseError, match="none of operators"):
+    with pytest.raises(ParseError, match="without a form in operators"):
         prove(text)
 
 

@@ -1,4 +1,4 @@
-"""What inverse kinematics refuses: by name, and leaving the model as it was."""
+"""Refusals of inverse kinematics: by name, with the model unchanged."""
 
 import numpy as np
 import pytest

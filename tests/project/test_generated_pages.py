@@ -17,7 +17,7 @@ def pages():
 
 
 def test_the_table_of_contents_lists_them(pages):
-    """By its first page each room is listed; that lists the others."""
+    """The first page of each folder is listed, and lists the others."""
     assert set(contents.GENERATED) <= set(pages) and set(contents.GENERATED) <= set(contents.listed())
     for page in set(pages) - set(contents.GENERATED):
         folder, _, name = page.rpartition("/")
