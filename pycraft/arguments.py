@@ -135,7 +135,7 @@ def seed_of(seed: Any) -> np.random.Generator:
 def parents_of(parents: Any, what: str) -> list[int]:
     """Return the number of each body's parent, smaller than the body's own, -1 for the base. `what`: the owner, for errors."""
     if isinstance(parents, np.ndarray) and parents.ndim != 1:
-        raise _core.ModelError(f"parents of {what}: a list of whole numbers, not an array {parents.shape}")
+        raise _core.ModelError(f"parents of {what} must be a list of whole numbers, not an array {parents.shape}")
     inboard = [whole(p, f"parents of {what}") for p in listed(parents, f"parents of {what}")]
     for k, parent in enumerate(inboard):
         if not -1 <= parent < k:
