@@ -95,7 +95,7 @@ class Run(Motion, Renamed):
         """Coordinates that left limits of the model not held by a `Limits` effect of the scene, in the model's order.
 
         Each has `coordinate`, `limit`, `upper`, `first` (s) and `farthest`. Checked at the ends of all steps, or at the rows if the
-        run kept no steps. Empty for a run read from a file without its scene. Cost: O(K N), once.
+        run kept no steps. Saved in the files of runs. Cost: O(K N), once.
         """
         if "stops" not in self._about:
             return []

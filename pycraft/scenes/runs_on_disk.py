@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from .. import _core
 from ..file_targets import writable_target
 from ..models.multibody import Multibody
 from .coordinate_units import coordinate_units
+from .crossed_limits import CrossedLimit
 from .events import EventStates
 from .run_tables import HOLDS, columns_of, variables_of
 
@@ -75,11 +77,15 @@ def load_run(path: str | Path) -> Any:
 
 
 def _about(run: Any) -> str:
-    about = {name: value for name, value in run._about.items() if name != "model"}
+    about = {name: value for name, value in run._about.items() if name not in ("model", "stops")}
     events = {name: {key: getattr(e, key).tolist() for key in ("t", "q", "v", "states")} for name, e in run.events.items()}
     model = json.loads(json.dumps(run.model.description(), default=_plain))
+    crossed = [asdict(each) for each in run.crossed_limits]
     return json.dumps(
-        {"format": FORMAT, "model": model, "about": about, "events": events, "ended_by": run.ended_by, "statistics": run.statistics},
+        {
+            "format": FORMAT, "model": model, "about": about, "events": events, "ended_by": run.ended_by, "statistics": run.statistics,
+            "crossed_limits": crossed,
+        },
         default=_plain,
     )  # fmt: skip
 
@@ -119,6 +125,8 @@ def _run(
         "forces": along["forces"].reshape(len(about["effects"]), n, nv),
         "vdot": along["vdot"].reshape(n, nv),
     }
+    if "crossed_limits" in told:
+        run.__dict__["crossed_limits"] = [CrossedLimit(**each) for each in told["crossed_limits"]]
     if steps is None:
         run._steps = {"t": run.t, "q": run.q, "v": run.v, "states": run.states, "work": run._work}
     return run

@@ -4,6 +4,7 @@ import builtins
 import csv
 import json
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -260,3 +261,35 @@ def test_files_of_the_first_format(t_eval, tmp_path):
         newer.createVariable("kinetic", "d", ("time",))[:] = 0.0
     with pytest.raises(pc.EvaluationError, match="the format 'pycraft run 3'; this version reads 'pycraft run 1' or 'pycraft run 2'"):
         pc.load_run(tmp_path / "newer.nc")
+
+
+@pytest.mark.parametrize("ending", ["nc", "parquet", "csv"])
+def test_limits_that_are_held_and_that_are_crossed(ending, tmp_path):
+    """A run of a scene with stops is written as any other, and one without them keeps what it crossed."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="extra [data]")
+    model = pc.Multibody("ball")
+    model.add_body("b", None, "slider", axis=(0, 0, 1), mass=1.0, limits=(0, np.inf))
+    for stops in ([E.Limits(1e4, 0.0)], []):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", pc.ModelWarning)
+            run = pc.Scene(model).add(E.Gravity(), *stops).simulate(2.0, [1.0], [0.0], progress=False)
+        run.save(tmp_path / f"run.{ending}")
+        if ending == "csv":
+            continue
+        again = pc.load_run(tmp_path / f"run.{ending}")
+        same(run, again)
+        assert again.crossed_limits == run.crossed_limits and len(run.crossed_limits) == (not stops)
+
+
+@pytest.mark.parametrize("ending", ["nc", "parquet"])
+def test_a_run_that_switched(ending, tmp_path):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="extra [data]")
+    finger = pc.Multibody("finger")
+    finger.add_body("f", axis=(0, 0, 1), mass=0.01, com=(0.02, 0, 0), inertia=1e-6 * np.eye(3))
+    run = pc.Scene(finger).add(E.TorqueSource(0.2), E.CoulombFriction(0.5)).simulate(1.0, [0.0], [0.0], progress=False)
+    run.save(tmp_path / f"run.{ending}")
+    again = pc.load_run(tmp_path / f"run.{ending}")
+    same(run, again)
+    assert [method for _, method in again.statistics["switches"]] == ["rosenbrock4"]
