@@ -263,19 +263,19 @@ _LETTERS = [
 ]
 
 
-_OTHER_GREEK = {
+OTHER_GREEK = {
     "α": "alpha", "β": "beta", "δ": "delta", "ε": "epsilon", "ϵ": "epsilon", "ζ": "zeta", "η": "eta", "ι": "iota", "κ": "kappa",
     "λ": "lamda", "μ": "mu", "µ": "mu", "ν": "nu", "ξ": "xi", "π": "pi", "ρ": "rho", "σ": "sigma", "χ": "chi", "ω": "omega",
     "Γ": "Gamma", "Ξ": "Xi", "Φ": "Phi", "Ψ": "Psi",
 }  # fmt: skip
 """Greek letters that the table has not; lambda is a word of Python's, lamda is Unicode's name of the letter."""
-GREEK = {*_OTHER_GREEK.values()}
+GREEK = {*OTHER_GREEK.values()}
 """Names of Greek letters that stand for nothing by themselves."""
 _ACCENT_NAMES = {
     "\u0303": "_tilde", "\u0304": "_bar", "\u0305": "_bar", "\u0307": "_dot", "\u0308": "_ddot", "\u0302": "_hat", "\u0332": "_underline",
     "\u030c": "_check", "\u0306": "_breve",
 }  # fmt: skip
-_IN_ASCII = {**{unicodedata.normalize("NFC", letter): name for letter, name in _LETTERS}, **_OTHER_GREEK}
+_IN_ASCII = {**{unicodedata.normalize("NFC", letter): name for letter, name in _LETTERS}, **OTHER_GREEK}
 _SUBSCRIPT = r"((?:_(?:plus|\d+|\w))?)"
 
 
@@ -344,7 +344,7 @@ _NAMES = _rules(
         # what bears an accent that makes no letter of the table: first those of two characters, φ̃ with a dot
         (rf"([^\W\d_](?:\u0303|\u0304|\u0307)?){_SUBSCRIPT}([{''.join(_ACCENT_NAMES)}]+){_SUBSCRIPT}", _only_others),
         *((_no_combining(letter), name) for letter, name in _LETTERS),
-        (rf"([{''.join(_OTHER_GREEK)}]){_SUBSCRIPT}", lambda m: f" {_OTHER_GREEK[m[1]]}{m[2]} "),
+        (rf"([{''.join(OTHER_GREEK)}]){_SUBSCRIPT}", lambda m: f" {OTHER_GREEK[m[1]]}{m[2]} "),
         (r"\s+(?=_(?:(?:dot|ddot|tilde|bar|hat|plus)(?![A-Za-z])|(?:ff|fp|pf|pp|[fpwcnrgsSJ2])(?![a-z0-9])))", ""),
         (r"(?<![A-Za-z_])(?:ln|log)\s*\|\s*det\s*(\([^|]*\)|\[[^|]*\]|[^|]*)\|", lambda m: f" logdet({m[1]}) "),
         (r"(?<![A-Za-z_])(?:ln|log)\s*(?:\(\s*det\s*\(([^()]*)\)\s*\))", r" logdet(\1) "),

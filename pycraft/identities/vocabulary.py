@@ -21,7 +21,7 @@ from .. import _core
 from .any_nodes import any_nodes
 from .directions import COORDINATES, along, coordinates_meant
 from .part_letters import OF_ROTORS, PARTS, part, text_of_part
-from .spelling import Spelled
+from .spelling import OTHER_GREEK, Spelled
 from .standard_letters import STANDARD
 
 
@@ -259,12 +259,29 @@ class Vocabulary:
         for ending, remedy in _ENDINGS.items():
             if name.endswith(ending) and name.removesuffix(ending) in self.names:
                 return remedy.format(name.removesuffix(ending), name)
+        if name in PARTS:
+            return f"{name} is a letter of models with loops, and this one has none; define another: {name} := …; statement"
         near = get_close_matches(name, [*self.names, *WITH_ARGUMENTS, *FUNCTIONS], cutoff=0.7)
-        return f"no operator is called {name!r}" + (
-            f"; the nearest names are {', '.join(near)}" if near else f"; define it: {name} := …; statement"
+        typed = letter_text(name)
+        return f"no operator is called {typed!r}" + (
+            f"; the nearest names are {', '.join(map(letter_text, near))}" if near else f"; define it: {typed} := …; statement"
         )
 
 
+def letter_text(name: str) -> str:
+    """Return a letter as it is shown, ψ̃ for psi_tilde and Γ for Gamma; a name without a letter stays as it is."""
+    base, _, rest = name.rpartition("_")
+    if name in _TEXTS or not base:
+        return _TEXTS.get(name, name)
+    return _TEXTS[base] + ("\u0307" if rest == "dot" else f"_{rest}") if base in _TEXTS else name
+
+
+_TEXTS = {
+    **{name: letter for letter, name in OTHER_GREEK.items()},
+    **{s.name: s.text for s in _core.symbols},
+    **{name: known.text for name, known in STANDARD.items()},
+    **{"MM": "ℳ", "vdot": "θ̈"},
+}
 _ENDINGS = {
     "_ddot": "two dots over {0} are not read: write ∂_t(∂_t {0}), or define {1}",
     "_tilde": "{0} has no tilde in the book: define {1} := …",

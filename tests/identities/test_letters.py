@@ -114,7 +114,7 @@ def test_definitions_in_all_readers():
         ("L := W; W := L; L = I", "defined by itself"),
         ("2A := φ; φ = φ", "is no name"),
         ("A := φ = ψ; A = φ", "stands for one expression"),
-        ("Γ = φ", "no operator is called 'Gamma'; define it"),
+        ("Γ = φ", "no operator is called 'Γ'; define it: Γ := …"),
         ("M̃ = φ", "M has no tilde in the book"),
         ("p̈ = f", "two dots over p"),
         ("ψ = φ; A = I", "is no definition"),

@@ -106,3 +106,25 @@ def test_letters_of_loops_are_told_from_ones_own():
     assert said_of_loops("ℳ_r = X*ℳX") and said_of_loops("Qθ̇ = 0") and not said_of_loops("Q := φ; Q = φ") and not said_of_loops("A = φ")
     with pytest.raises(pc.ModelError, match="has no loops"):
         pc.check("ℳ_r = X*ℳX", pc.chain(3))
+
+
+def test_no_error_says_that_a_known_letter_does_not_exist():
+    """Every letter of the tables, by name and as it is shown, on models that have it and on models that have not."""
+    from pycraft import _core
+    from pycraft.identities.part_letters import PARTS
+    from pycraft.identities.standard_letters import STANDARD
+    from pycraft.identities.vocabulary import letter_text
+
+    names = [*(s.name for s in _core.symbols), *STANDARD, *PARTS, "MM", "I", "N", "vdot"]
+    for model in (pc.chain(2), closed_models(0)[0]):
+        for typed in dict.fromkeys([*names, *map(letter_text, names)]):
+            try:
+                Statements(model.soa).read(f"{typed} = 2 {typed}")
+            except pc.Error as error:
+                assert "no operator is called" not in str(error), (typed, str(error))
+
+
+def test_letters_have_one_spelling_in_messages():
+    with pytest.raises(pc.Error, match="the nearest names are ψ̃") as caught:
+        pc.check("psi_tild = φ", pc.chain(2))
+    assert "psi_tilde" not in str(caught.value)
