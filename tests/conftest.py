@@ -1,4 +1,4 @@
-"""What the everyday subset leaves out beside tests that mark themselves: what takes seconds beside a quick test, and most of many cases."""
+"""Tests excluded from the everyday subset besides tests that mark themselves: slow tests beside a quick one, and most of many cases."""
 
 import os
 import tempfile

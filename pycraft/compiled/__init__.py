@@ -1,7 +1,7 @@
-"""Code generated for one model: what a plan or a kernel does, written out as straight-line C++, built by the system's compiler and loaded.
+"""Code generated for one model: a plan or a kernel as straight-line C++, built by the system's compiler and loaded.
 
-`trace` holds numbers that remember how they came about, `kernels` and `frames` run the direct calls on them, `expressions` the recursion of
-an expression; `source` writes the C++, `build` keeps what was built, `compiled` is the callable.
+`trace` defines numbers that record their operations; `kernels` and `frames` run the direct calls on them, `expressions` the recursion of
+an expression; `source` writes the C++, `build` caches the libraries, `compiled` is the callable.
 """
 
 from .compiled import Compiled, compile_call, compile_expression

@@ -23,22 +23,22 @@ from .source import FUNCTION, written
 from .trace import Graph
 
 MOST_OPERATIONS, MOST_RESULTS = 100_000, 20_000
-"""Beyond which a compiler takes minutes over straight lines, and a state's results more than a stack may hold."""
+"""Limits beyond which a compiler takes minutes for straight-line code, and the results of a state overflow the stack."""
 
 _OF_FRAMES = ("jacobian", "pose")
 
 
 class Compiled:
-    """What a compiled function tells of itself, and what answers where it does not: arguments of other kinds, states in doubt.
+    """A compiled function and its description. The ordinary call replaces it for other kinds of arguments and for doubtful states.
 
     Attributes
     ----------
-    name : what it computes
-    arguments : the names of its arrays, each of one state or with a leading batch axis
-    shape : of the result of one state
-    source : the C++ that was compiled; it stands by itself
-    library : path of the library that was built of it
-    operations : how many a state takes: sums, products, quotients, a sine as one
+    name : name of the result
+    arguments : names of its arrays, each for one state or with a leading batch axis
+    shape : shape of the result for one state
+    source : the compiled C++, self-contained
+    library : path of the built library
+    operations : operations per state: sums, products, quotients; a sine counts as one
     """
 
     _again: Callable[[], tuple[Any, ...]]
@@ -47,8 +47,8 @@ class Compiled:
         size = len(graph.needed(results.ravel().tolist()))
         if size > MOST_OPERATIONS or results.size > MOST_RESULTS:
             raise _core.EvaluationError(
-                f"{name} comes to {size} operations and {results.size} results in straight lines; compile() writes up to {MOST_OPERATIONS} "
-                f"and {MOST_RESULTS}. The call itself, prepare() and at(q) take models of any size"
+                f"{name} needs {size} operations and {results.size} results in straight-line code; compile() allows {MOST_OPERATIONS} "
+                f"and {MOST_RESULTS}. The ordinary call, prepare() and at(q) take models of any size"
             )
         self.name, self.arguments, self.shape = name, tuple(a for a, _ in arguments), results.shape
         title = f"{name}: {', '.join(f'{a} ({n})' for a, n in arguments) or 'no input'} -> {results.shape}"
@@ -58,11 +58,9 @@ class Compiled:
         self.__doc__ = f"{name}({', '.join(self.arguments)}, *, out=None), compiled; one state, or a leading batch axis."
 
     def __call__(self, *given: Any, out: Any = None) -> Any:
-        """By the ordinary way, whose errors name what is wrong."""
+        """Evaluate by the ordinary call, whose errors name the cause."""
         if len(given) != len(self.arguments):
-            raise TypeError(
-                f"compiled {self.name} takes {', '.join(self.arguments) or 'no arrays'}, and out=; it was given {len(given)} arguments"
-            )
+            raise TypeError(f"compiled {self.name} takes {', '.join(self.arguments) or 'no arrays'}, and out=; got {len(given)} arguments")
         return self._ordinary(*given, out=out)
 
     def __reduce__(self):
@@ -73,7 +71,7 @@ class Compiled:
 
 
 def _callable(behind: Compiled, arguments: Sequence[tuple[str, int]], again: Callable[[], tuple[Any, ...]]) -> Any:
-    """again: how it is copied and pickled, a function and its arguments; where the library was built before, it is loaded."""
+    """Return the callable. `again` is the function and arguments used to copy and pickle it; a cached library is loaded, not rebuilt."""
     behind._again = again
     if 0 in behind.shape:
         return behind  # nothing to compute
@@ -87,17 +85,15 @@ def _told(call: Any) -> Any:
 
 
 def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
-    """What `Multibody.compile` gives."""
+    """Return a compiled direct call (`Multibody.compile`)."""
     known = (*INPUTS, ON_LOOPS, *_OF_FRAMES)
     if not isinstance(call, str) or call not in known:
         raise _core.EvaluationError(f"compile takes {', '.join(map(repr, known))}, not {call!r}")
     if (frame is not None) != (call in _OF_FRAMES):
-        raise _core.EvaluationError(
-            f"a compiled {call} is that of a frame: compile({call!r}, frame=...)" if frame is None else f"a compiled {call} has no frame"
-        )
-    held = copy.deepcopy(model)  # later edits change neither what is compiled nor what answers in its place
+        raise _core.EvaluationError(f"{call} needs a frame: compile({call!r}, frame=...)" if frame is None else f"{call} takes no frame")
+    held = copy.deepcopy(model)  # later edits change neither the compiled code nor its replacement
     if call == ON_LOOPS:
-        graph, results = loops_graph(held, 4 * MOST_OPERATIONS)  # what no result needs is among them
+        graph, results = loops_graph(held, 4 * MOST_OPERATIONS)  # includes operations that no result needs
         ordinary, name = partial(_on_loops, held), call
     elif frame is None:
         graph, results = kernel_graph(held, call)
@@ -115,7 +111,7 @@ def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
 
 
 def _on_loops(model: Any, q: Any, v: Any, tau: Any, out: Any = None) -> Any:
-    """By the ordinary call, which says what is wrong."""
+    """Evaluate by the ordinary call, whose errors name the cause."""
     vdot = model.constrained_dynamics(q, v, tau).vdot
     if out is None:
         return vdot
@@ -131,7 +127,7 @@ def _of_frame(model: Any, call: str, frame: str, q: Any, out: Any = None) -> Any
 
 
 def compile_expression(expression: Any, request: str = "apply") -> Any:
-    """What `Operator.compile` and `Scalar.compile` give."""
+    """Return a compiled expression (`Operator.compile` and `Scalar.compile`)."""
     made = ExpressionGraph(expression, request)
     numbers = _numbers_of(made.model)
     ordinary = partial(_evaluated, expression, request, made, numbers)
@@ -145,7 +141,7 @@ def compile_expression(expression: Any, request: str = "apply") -> Any:
 
 
 def _numbers_of(model: Any) -> bytes:
-    """What an edit changes."""
+    """Return the values that an edit changes."""
     return b"" if model is None else pickle.dumps({k: v for k, v in describe(model).items() if k not in ("q", "v")})
 
 
@@ -155,14 +151,14 @@ def _check_edits(expression: Any, made: ExpressionGraph, numbers: bytes) -> None
 
 
 def _evaluated(expression: Any, request: str, made: ExpressionGraph, numbers: bytes, *given: Any, out: Any = None) -> Any:
-    """The expression at states, one after another, by its plan."""
+    """Evaluate the expression by its plan, state after state."""
     _check_edits(expression, made, numbers)
     names, shape = [name for name, _ in made.arguments], made.results.shape
     arrays = dict(zip(names, (np.asarray(a, float) for a in given), strict=True))
     batches = {len(a) for a in arrays.values() if a.ndim == 2}
     if len(batches) > 1 or any(a.ndim not in (1, 2) for a in arrays.values()):
         shapes = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
-        raise _core.ModelError(f"each argument is of one state or of as many as the others: {shapes}")
+        raise _core.ModelError(f"each argument needs one state, or as many as the others; got {shapes}")
     count = batches.pop() if batches else None
     result = np.empty(shape if count is None else (count, *shape))
     for b in range(1 if count is None else count):
@@ -181,7 +177,7 @@ def _evaluated(expression: Any, request: str, made: ExpressionGraph, numbers: by
 
 def _check_out(out: Any, shape: tuple[int, ...]) -> None:
     if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != float or not out.flags.writeable:
-        raise _core.ModelError(f"out= takes a writeable float64 array of shape {shape}")
+        raise _core.ModelError(f"out= must be a writeable float64 array of shape {shape}")
 
 
 def _requested(bound: Any, request: str, x: np.ndarray | None) -> Any:

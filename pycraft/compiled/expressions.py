@@ -1,6 +1,6 @@
-"""Expressions as straight-line code: the recursion that `algorithm("python")` writes, run once on numbers that remember their making.
+"""Expressions as straight-line code: the recursion that `algorithm("python")` writes, run once on numbers that record their operations.
 
-What its functions decide by numbers (pivots, residuals) becomes a guard: where it does not hold, the expression is evaluated as usual.
+Decisions by value (pivots, residuals) become guards: where a guard fails, the expression is evaluated in the ordinary way.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from .kinematics import Kinematics, force_transform
 from .trace import Graph
 
 REQUESTS = ("apply", "dense", "diagonal", "trace", "logdet", "norm")
-_FAINT = 1e-11  # of a pivot beside what it might be: far above what rounding leaves of a zero, far below what robots have
+_FAINT = 1e-11  # ratio of a pivot to its scale: far above the rounding error of a zero, far below pivots of robots
 
 
 class _TracedNumpy:
-    """NumPy as the source of recursions uses it, on arrays of objects."""
+    """The part of NumPy that the source of recursions uses, on arrays of objects."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(np, name)
@@ -49,20 +49,20 @@ class _TracedNumpy:
 
 
 class _Functions:
-    """The functions that decide by numbers, with guards in the place of decisions. `scale`: what a hinge can feel at most."""
+    """The functions that decide by value, with guards instead of decisions. `scale`: largest inertia that a hinge can feel."""
 
     def __init__(self, graph: Graph, scale: float):
         self.graph, self.scale = graph, scale
 
     def symmetric(self, A: np.ndarray) -> np.ndarray:
-        """Of a matrix that is symmetric but for rounding: its upper triangle on both sides."""
+        """Return a matrix that is symmetric except for rounding, with its upper triangle on both sides."""
         made = A.copy()
         for i in range(len(A)):
             made[i + 1 :, i] = A[i, i + 1 :]
         return made
 
     def _factors(self, A: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[Any]]:
-        """L, U and the pivots of A = L diag(pivots) U, of unit triangles; each pivot is guarded."""
+        """Return L, U and the pivots of A = L diag(pivots) U with unit triangles; each pivot is guarded."""
         n, graph = len(A), self.graph
         U, pivots = np.array([[graph.number(x) for x in row] for row in A], object).reshape(n, n), []
         L = _TracedNumpy.eye(n)
@@ -133,15 +133,15 @@ class _Functions:
         return x.function("sqrt")
 
     def names(self) -> dict[str, Any]:
-        """By the names that the source calls them by."""
+        """Return the functions by their names in the source."""
         offered = ("symmetric", "solve", "inverse", "logdet", "root", "trace", "norm", "square_root")
         return {name: getattr(self, name) for name in offered}
 
 
 def _traced_system(TreeSystem: type, graph: Graph, functions: _Functions) -> type:
-    """The elimination along a tree, its check by a known solution as guards."""
+    """Return the elimination along a tree, with its check against a known solution as guards."""
 
-    class TracedTreeSystem(TreeSystem):  # type: ignore[misc]  # known when the source has run
+    class TracedTreeSystem(TreeSystem):  # type: ignore[misc]  # defined when the source has run
         factored: bool
 
         def factor(self) -> None:
@@ -149,7 +149,7 @@ def _traced_system(TreeSystem: type, graph: Graph, functions: _Functions) -> typ
                 return
             self.factored = True
             A, U, X, Y = self.pivots = tuple([np.empty((0, 0), object)] * self.n for _ in range(4))
-            scale, functions.scale = functions.scale, 0.0  # other pivots than those of hinges
+            scale, functions.scale = functions.scale, 0.0  # these pivots are not pivots of hinges
             for k in reversed(range(self.n)):
                 c_k = self.children[k]
                 A[k] = self.T_own[k] - sum(self.T_up[c] @ U[c] for c in c_k)
@@ -178,22 +178,22 @@ _DERIVED = {
 
 
 def _check_recordable(source: Any, expression: Any) -> None:
-    """Raise EvaluationError where the letters of a tree are known as numbers at a state alone, and would stay what they are now."""
+    """Raise EvaluationError if the letters of a tree are known only as values at one state, which the code would freeze."""
     if isinstance(source, (_core.MultibodyOperators, _core.MatrixTree)):
         return
     made = source.derived_from
-    if made is None and isinstance(source.__reduce__()[1][0], _core.MatrixTree):  # bodies in pairs, of a tree that does not move
+    if made is None and isinstance(source.__reduce__()[1][0], _core.MatrixTree):  # bodies in pairs, in a tree that does not move
         return
     what = _DERIVED[made[0]] if made is not None else "the tree of bodies in pairs"
     raise _core.EvaluationError(
-        f"compile() cannot record {expression.text()}: it has letters of {source.name!r}, {what}, which compile() does not know as "
-        "functions of q, so that the code would keep their values at the model's present state. Evaluate it by at(q), which takes "
-        "batches; or compile it at one state: at(q).compile()"
+        f"compile() cannot record {expression.text()}: its letters of {source.name!r}, {what}, are not available as "
+        "functions of q, so the code would freeze their values at the model's present state. Evaluate it by at(q), which takes "
+        "batches, or compile it at one state: at(q).compile()"
     )
 
 
 def _scale(model: Any) -> float:
-    """What a hinge can feel at most: all masses at the length of all of the way, and their own inertias."""
+    """Return the largest inertia that a hinge can feel: all masses at the total length of the tree, and their own inertias."""
     bodies = describe(model)["bodies"]
     mass = sum(b["mass"] for b in bodies)
     way = sum(np.abs(b["hinge"]["placement"]["position"]).sum() + np.abs(b["com"]).sum() for b in bodies)
@@ -206,14 +206,14 @@ class ExpressionGraph:
     Attributes
     ----------
     graph, results : the nodes of the result, in its shape
-    arguments : names and widths of what it is a function of: q and v of a model at whose state letters are free, x
-    model : that model; None where everything is bound
+    arguments : names and widths of the arguments: q and v of a model whose letters are not bound, and x
+    model : that model; None if everything is bound
     vectors : the names of named vectors by those of their arguments
     """
 
     def __init__(self, expression: Any, request: str):
         if request not in REQUESTS:
-            raise _core.EvaluationError(f"compile() makes {', '.join(map(repr, REQUESTS))}, not {request!r}")
+            raise _core.EvaluationError(f"compile() supports {', '.join(map(repr, REQUESTS))}, not {request!r}")
         algorithm = Algorithm(expression, "python", request)
         for model in algorithm._book.models:
             if not model.binding:
@@ -221,9 +221,7 @@ class ExpressionGraph:
         self.graph = Graph()
         free = [m for m in algorithm._book.models if not m.binding and isinstance(m.source, _core.MultibodyOperators)]
         if len(free) > 1:
-            raise _core.EvaluationError(
-                "compile() takes expressions of one model, in one way of taking its bodies; bind the others by at(q)"
-            )
+            raise _core.EvaluationError("compile() takes expressions of one model in one ordering of its bodies; bind the others by at(q)")
         self.model = free[0].source.model if free else None
         data = algorithm.data()
         reads_v = False
@@ -242,7 +240,7 @@ class ExpressionGraph:
         names = [name for name, _ in self.arguments]
         for name in names:
             if names.count(name) > 1:
-                raise _core.EvaluationError(f"a vector called {name!r} has the name of another argument of what compile() makes; rename it")
+                raise _core.EvaluationError(f"the vector {name!r} has the name of another argument of the compiled function; rename it")
         results = self._run(str(algorithm), data, given)
         found = np.array(results, object)
         nodes = [self.graph.number(x).index for x in found.ravel()]
@@ -258,7 +256,7 @@ class ExpressionGraph:
         return names["algorithm"](data, *given)
 
     def _moving(self, algorithm: Algorithm, model: Any, data: dict[str, Any]) -> dict[str, Any]:
-        """The given letters that depend on the state, as functions of it."""
+        """Return the given letters that depend on the state, as functions of the state."""
         source = self.model
         assert source is not None
         samples = [algorithm.data(s.q, s.v) for s in (random_state(source, k) for k in (1, 2))]
@@ -268,7 +266,7 @@ class ExpressionGraph:
         for leaf in algorithm._book.leaves:
             name = leaf.quantity.name
             if leaf.source == "external":
-                raise _core.EvaluationError(f"compile() cannot see into {name!r}, an operator from outside")
+                raise _core.EvaluationError(f"compile() cannot see into {name!r}, an external operator")
             if name not in data or leaf.context != model.index or all(_equal(data[name], s[name]) for s in samples):
                 continue
             match leaf.symbol:
@@ -289,13 +287,13 @@ class ExpressionGraph:
                     made[name] = np.concatenate(parts).reshape(-1, 1)
                 case _:
                     raise _core.EvaluationError(
-                        f"compile() knows no formula of {leaf.symbol} in the coordinates; bind it to a state by at(q)"
+                        f"compile() has no formula for {leaf.symbol} as a function of the coordinates; bind it to a state by at(q)"
                     )
         return made
 
 
 def _equal(a: Any, b: Any) -> bool:
-    """Whether two of a leaf's numbers are the same, to the bit."""
+    """Return True if two values of a leaf are equal bit for bit."""
     if isinstance(a, (list, tuple)):
         return len(a) == len(b) and all(_equal(x, y) for x, y in zip(a, b, strict=True))
     return a is b if a is None or b is None else bool(np.array_equal(a, b))

@@ -14,7 +14,7 @@ _STILL: Pose = (np.array(np.eye(3).tolist(), object), np.full(3, 0.0, object))
 
 
 def frame_graph(model: Any, call: str, frame: str) -> tuple[Graph, np.ndarray]:
-    """The graph of "pose" or "jacobian" of a frame that the model has, and the nodes of its result."""
+    """Return the graph of "pose" or "jacobian" of a frame of the model, and the nodes of its result."""
     graph = Graph()
     at = Kinematics(model, graph)
     description = model.description()

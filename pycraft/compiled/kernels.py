@@ -1,5 +1,5 @@
-"""Direct calls as straight-line code: what their kernels do for one model (cpp/kernels/taped_calls.h), with its numbers folded in, and what
-dynamics on loops does at a state on them (cpp/dynamics/recorded_on_loops.h)."""
+"""Direct calls as straight-line code: the operations of their kernels for one model (cpp/kernels/taped_calls.h), with constants folded, and
+of dynamics on loops (cpp/dynamics/recorded_on_loops.h)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .. import _core
 from .trace import Graph
 
 BESIDE = 0.1
-"""How far, in radians and metres, the state at which dynamics on loops is written down is moved from the model's own."""
+"""Displacement, radians and metres, from the model's own state to the state at which dynamics on loops is recorded."""
 
 ON_LOOPS = "constrained_dynamics"
-"""The call whose tape is written by no kernel, of the inputs of forward dynamics."""
+"""The only call without a kernel; it takes the inputs of forward dynamics."""
 INPUTS = {
     "forward_dynamics": ("q", "v", "tau"),
     "inverse_dynamics": ("q", "v", "vdot"),
@@ -25,12 +25,12 @@ INPUTS = {
 
 
 def kernel_graph(model: Any, call: str) -> tuple[Graph, np.ndarray]:
-    """The graph of a direct call, and the nodes of its result. ModelError where no kernel knows the model's hinges."""
+    """Return the graph of a direct call, and the nodes of its result. Raises ModelError if no kernel supports the model's hinges."""
     tape = _core.kernel_tape(model, call)
     if tape is None:
         raise _core.ModelError(
-            f"{call} of {model.name!r} cannot be compiled: no kernel knows a rotor on a ball or free hinge, nor some sliders behind "
-            "other subhinges; its expressions can be"
+            f"{call} of {model.name!r} cannot be compiled: kernels do not support rotors on ball or free hinges, nor some sliders after "
+            "other subhinges; compile an expression of the model instead"
         )
     graph, results = _graph_of(tape, INPUTS[call][-1])
     shape = (model.nv, model.nv) if call in ("mass_matrix", "mass_matrix_inverse") else (model.nv,)
@@ -38,10 +38,10 @@ def kernel_graph(model: Any, call: str) -> tuple[Graph, np.ndarray]:
 
 
 def loops_graph(model: Any, most: int) -> tuple[Graph, np.ndarray]:
-    """The graph of accelerations on loops, and the nodes of its result, as they are decided beside the model's own state.
+    """Return the graph of accelerations on loops, and the nodes of its result, recorded near the model's own state.
 
-    That is moved a little, as special states decide as no other does. ModelError where `most` operations are not enough, or the loops have
-    what cannot be compiled, or cannot be assembled.
+    The state is displaced a little, because branches at special states differ from all others. Raises ModelError if `most` operations are
+    too few, or if the loops cannot be compiled or assembled.
     """
     generator = np.random.default_rng(0)
     beside = model.integrate(model.q, generator.uniform(-BESIDE, BESIDE, model.nv))
@@ -51,7 +51,7 @@ def loops_graph(model: Any, most: int) -> tuple[Graph, np.ndarray]:
 
 
 def _graph_of(tape: Any, third: str) -> tuple[Graph, np.ndarray]:
-    """A tape (cpp/bindings/tapes.h) as a graph; `third` is what its third array is called."""
+    """Return a tape (cpp/bindings/tapes.h) as a graph; `third` is the name of its third array."""
     graph = Graph()
     does, taken, number, results, guards = tape
     made: list[int] = []
@@ -66,7 +66,7 @@ def _graph_of(tape: Any, third: str) -> tuple[Graph, np.ndarray]:
             case "both":
                 truths[at] = truths[a] + truths[b]
             case "equal":
-                pass  # a guard, of what is compared
+                pass  # a comparison of a guard
             case "root" | "logarithm":
                 node = graph.put("sqrt" if what == "root" else "log", made[a])
             case "negate" | "sine" | "cosine" | "magnitude":
@@ -88,7 +88,7 @@ def _graph_of(tape: Any, third: str) -> tuple[Graph, np.ndarray]:
 
 
 def _instead(graph: Graph, what: str, a: int, b: int, holds: bool) -> list[int]:
-    """Guards that hold where a comparison does not, or where it is an equality that does."""
+    """Add guards that hold where a comparison fails, or where an equality holds."""
     match what, holds:
         case "greater", False:
             return [graph.put("at_least", b, a)]
@@ -98,4 +98,4 @@ def _instead(graph: Graph, what: str, a: int, b: int, holds: bool) -> list[int]:
             return [graph.put("at_least", a, b), graph.put("at_least", b, a)]
         case "equal", False:
             return [graph.put("greater", graph.put("magnitude", graph.put("subtract", a, b)), graph.zero)]
-    raise _core.EvaluationError(f"a guard of kind {what!r} is not known")  # no tape leaves one
+    raise _core.EvaluationError(f"unknown kind of guard {what!r}")  # no tape contains one

@@ -1,6 +1,6 @@
-"""The given blocks of a model as functions of its coordinates: E(p,k), H(k), Ḣ(k) and θ̇(k) in traced numbers.
+"""The given blocks of a model as functions of its coordinates: E(p,k), H(k), Ḣ(k) and θ̇(k) as traced numbers.
 
-What does not depend on the state (M, J, the nodes' B, ...) is a number already, and is not made here.
+Letters that do not depend on the state (M, J, the nodes' B, ...) are constants and are not computed here.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ def _block(upper: list[np.ndarray], lower: list[np.ndarray]) -> np.ndarray:
 _ZERO, _ONE = np.full((3, 3), 0.0, object), np.array(np.eye(3).tolist(), object)
 
 Pose = tuple[np.ndarray, np.ndarray]
-"""R (3, 3) and l (3,): how a frame lies in another."""
+"""Pose of a frame in another: R (3, 3) and l (3,)."""
 
 
 def composed(first: Pose, second: Pose) -> Pose:
-    """The second pose, given in the frame of the first."""
+    """Return the composition of two poses, the second given in the frame of the first."""
     return first[0] @ second[0], first[1] + first[0] @ second[1]
 
 
 def force_transform(pose: Pose) -> np.ndarray:
-    """φ of a pose: [[R, l̃R], [0, R]] takes forces (n; f) from the frame to that which it lies in."""
+    """Return φ of a pose: [[R, l̃R], [0, R]] transforms forces (n; f) from the frame to its reference frame."""
     R, l = pose
     return _block([R, skew(l) @ R], [_ZERO, R])
 
 
 def rotation_of(q: list[Traced]) -> np.ndarray:
-    """R(q) of a quaternion w, x, y, z of any length but zero."""
+    """Return R(q) of a quaternion w, x, y, z of any nonzero length."""
     w, x, y, z = q
     k = 2.0 / (w * w + x * x + y * y + z * z)
     kx, ky, kz = k * x, k * y, k * z
@@ -66,7 +66,7 @@ def rotation_of(q: list[Traced]) -> np.ndarray:
 
 
 def _step(subhinge: dict[str, Any], q: list[Traced]) -> Pose:
-    """How the frame after a subhinge lies in the frame before it. About an axis a: cos q I + sin q ã + (1 - cos q) a a*."""
+    """Return the pose of the frame after a subhinge in the frame before it. About an axis a: cos q I + sin q ã + (1 - cos q) a a*."""
     kind, a, c = subhinge["kind"], _numbers(subhinge["axis"]), _numbers(subhinge["point"])
     match kind:
         case "slider":
@@ -83,7 +83,7 @@ def _step(subhinge: dict[str, Any], q: list[Traced]) -> Pose:
 
 
 def _rows(subhinge: dict[str, Any]) -> np.ndarray:
-    """Rows of H in the frame after the subhinge: pin (a; c×a), slider (0; a), screw (a; c×a + pitch a), ball (e; c×e), free I."""
+    """Return rows of H in the frame after the subhinge: pin (a; c×a), slider (0; a), screw (a; c×a + pitch a), ball (e; c×e), free I."""
     kind, a, c = subhinge["kind"], _numbers(subhinge["axis"]), _numbers(subhinge["point"])
     none = np.full(3, 0.0, object)
     match kind:
@@ -108,13 +108,13 @@ def crm(h: np.ndarray) -> np.ndarray:
 
 
 class Kinematics:
-    """Hinge by hinge at traced coordinates.
+    """Kinematics hinge by hinge at traced coordinates.
 
     Attributes
     ----------
-    poses : of each body in its parent
+    poses : pose of each body in its parent
     H, H_dot : (n, 6) arrays of objects, body by body
-    theta_dot : the rates of each body's coordinates
+    theta_dot : rates of each body's coordinates
     """
 
     def __init__(self, model: Any, graph: Graph):
@@ -137,7 +137,7 @@ class Kinematics:
         rows: list[np.ndarray] = []
         changes: list[np.ndarray] = []
         later: Pose = (_ONE, np.full(3, 0.0, object))
-        moving = np.full(6, 0.0, object)  # of the body against the frame after this subhinge, in the body's frame
+        moving = np.full(6, 0.0, object)  # of the body relative to the frame after this subhinge, in the body's frame
         for subhinge, step, rate in reversed(list(zip(subhinges, steps, rates, strict=True))):
             own = _rows(subhinge) @ force_transform(later)
             rows[:0] = list(own)

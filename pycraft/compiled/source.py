@@ -1,6 +1,6 @@
 """A graph as C++: one function of straight lines, for one state and for a pack of states side by side, and the loop over a batch around it.
 
-The file stands by itself: it begins with the headers of the kernels that it calls (lanes.h, sine_cosine.h).
+The file is self-contained: it begins with the headers of the kernels that it calls (lanes.h, sine_cosine.h).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def _runtime(name: str) -> str:
 
 
 def _headers() -> str:
-    """The headers of lanes and of sine and cosine, as one text."""
+    """Return the headers of lanes and of sine and cosine as one text."""
     texts = _core.kernel_headers()
     inside = "\n".join(texts[name] for name in ("lanes.h", "sine_cosine.h"))
     inside = re.sub(r'^#pragma once\n|^#include "lanes/.*\n', "", inside, flags=re.MULTILINE)
@@ -38,7 +38,7 @@ def _headers() -> str:
 
 
 def written(graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, int]], title: str) -> tuple[str, int]:
-    """The source, and how many operations a state takes. `arguments`: names and widths of the inputs, `results` nodes of any shape."""
+    """Return the source and the operations per state. `arguments`: names and widths of the inputs; `results`: nodes of any shape."""
     lines = _Lines(graph, results.ravel().tolist())
     blanks = {
         "@INPUTS@": max(sum(n for _, n in arguments), 1),
@@ -51,7 +51,7 @@ def written(graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, in
         loop = loop.replace(blank, str(value))
     parts = [
         *(f"// {line}" for line in title.splitlines()),
-        f"// {lines.count} operations a state; t are what is computed on the way, s and c sines and cosines.",
+        f"// {lines.count} operations per state; t are intermediate values, s and c sines and cosines.",
         _headers(),
         _runtime("prelude.h"),
         "",
@@ -66,7 +66,7 @@ def written(graph: Graph, results: np.ndarray, arguments: Sequence[tuple[str, in
 
 
 def _array(name: str) -> str:
-    """What an input is called: a user's vector may have the name of what is written besides."""
+    """Return the C++ name of an input, because a user's vector may have a name that the source already uses."""
     return name if name in _KNOWN else f"in_{name}"
 
 
@@ -75,7 +75,7 @@ def _function(head: str, inside: Iterable[str]) -> list[str]:
 
 
 def _functions(lines: _Lines, names: list[str]) -> list[str]:
-    """`evaluate`, in pieces where it is long: a compiler's time grows faster than a function does."""
+    """Return `evaluate`, split into pieces if it is long, because compile time grows faster than the length of a function."""
     pieces = [lines.statements[i : i + _PIECE] for i in range(0, len(lines.statements), _PIECE)] or [[]]
     head = f"inline auto evaluate({', '.join([*(f'const S* {name}' for name in names), 'S* y'])})"
     if len(pieces) == 1:
@@ -97,7 +97,7 @@ def _functions(lines: _Lines, names: list[str]) -> list[str]:
 
 
 def _across(pieces: list[list[str]]) -> tuple[dict[str, int], dict[str, set[int]]]:
-    """In which piece each t is computed, and for those that others read, in which."""
+    """Return the piece that computes each t, and the pieces that read it."""
     made: dict[str, int] = {}
     used: dict[str, set[int]] = {}
     for i, piece in enumerate(pieces):
@@ -116,10 +116,10 @@ class _Lines:
 
     Attributes
     ----------
-    ahead : angles of inputs alone, their sines and cosines
-    statements : one a line, `const S t... = ...;`, results and guards among them
-    last : what is returned
-    count : how many operations they have
+    ahead : angles that depend only on inputs, with their sines and cosines
+    statements : one per line, `const S t... = ...;`, including results and guards
+    last : the return statement
+    count : number of operations
     """
 
     def __init__(self, graph: Graph, results: list[int]):
@@ -127,7 +127,7 @@ class _Lines:
         self.order = graph.needed(results)
         self.uses = Counter(taken for node in self.order for taken in operands(graph.operations[node]))
         self.uses.update(results)
-        self.text: dict[int, tuple[str, int]] = {}  # what stands for a node, and how strongly it binds (4: a name)
+        self.text: dict[int, tuple[str, int]] = {}  # text of a node, and its binding strength (4: a name)
         self.early, self.of_inputs = self._early()
         self.count = 0
         self.ahead: list[str] = []
@@ -139,7 +139,7 @@ class _Lines:
         self.last = self._guards()
 
     def _early(self) -> tuple[list[int], set[int]]:
-        """Angles of inputs alone: their sines and cosines are taken together, first. And what they are made of, which is no statement."""
+        """Return the angles that depend only on inputs, whose sines and cosines are computed together first, and the nodes inside them."""
         fixed: set[int] = set()
         angles: list[int] = []
         for node in self.order:
@@ -196,7 +196,7 @@ class _Lines:
         return self.graph.constant_of(node) is not None
 
     def _whole(self, node: int) -> str:
-        """As a number of every state, which a constant alone is not."""
+        """Return the text of a node as a pack of states, which a bare constant is not."""
         return f"S{{}} + {self.text[node][0]}" if self._is_constant(node) else f"S({self.text[node][0]})"
 
     def _bracketed(self, node: int, strength: int) -> str:
@@ -220,7 +220,7 @@ class _Lines:
         if name == "multiply":
             for one, other in ((first, second), (second, first)):
                 operation = self.graph.operations[one]
-                # A quotient of a number that is there before its divisor; else the reciprocal is not waited for.
+                # A quotient whose dividend is available before its divisor; otherwise the reciprocal costs no wait.
                 if operation[0] == "divide" and self.uses[one] == 1 and operation[2] > other:
                     return self._bracketed(other, strength - 1) + _SIGNS["divide"] + self._bracketed(operation[2], strength), strength
                 if operation[0] == "divide" and one is second:
@@ -230,7 +230,7 @@ class _Lines:
 
 
 def _number(x: float) -> str:
-    """A double that reads back as itself."""
+    """Return a literal that reads back as the same double."""
     if x != x:
         return 'std::nan("")'
     if x in (float("inf"), float("-inf")):

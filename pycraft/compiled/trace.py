@@ -1,11 +1,11 @@
-"""Numbers that remember how they came about: what is computed with them becomes straight-line code.
+"""Numbers that record their operations, so that a computation becomes straight-line code.
 
-A `Traced` is a node of a graph: a constant, an input, or an operation on nodes. Operations on constants are carried out, what adds zero or
-multiplies by zero or one is left out, and equal operations are one node. What is divided by one number is multiplied by its one
-reciprocal, which rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one. So loops, tables and zeros of a
-recursion that runs on such numbers are gone from what it leaves behind.
+A `Traced` is a node of a graph: a constant, an input, or an operation on nodes. Operations on constants are evaluated, additions of zero
+and multiplications by zero or one are dropped, and equal operations share a node. Several divisions by a number use one shared
+reciprocal, which rounds once more; the root of a square is a magnitude, and cos x + 2 sin² x/2 is one. Loops, tables and zeros of a
+recursion that runs on such numbers disappear from the recorded code.
 
-Leaving out 0 x is exact for finite x alone; what is built of a graph looks through its inputs and results for others (source.py).
+Dropping 0 x is exact only for finite x; the built code checks its inputs and results for other values (source.py).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 
 
 class Traced:
-    """A number of a graph. It takes part in arithmetic with numbers and arrays of objects; comparisons of it are not known yet."""
+    """A number of a graph. It supports arithmetic with numbers and arrays of objects, but no comparisons, because it has no value yet."""
 
     __slots__ = ("graph", "index")
 
@@ -37,13 +37,13 @@ class Traced:
 
     @property
     def value(self) -> float | None:
-        """The number, where it is a constant."""
+        """The number, if the node is a constant."""
         return self.graph.constant_of(self.index)
 
     def _with(self, operation: str, other: Any, swapped: bool = False) -> Any:
         if not isinstance(other, (Traced, int, float)):
             if not isinstance(other, numbers.Real):
-                return NotImplemented  # an array takes it entry by entry
+                return NotImplemented  # an array applies it entry by entry
         a, b = self.index, self.graph.number(other).index
         return Traced(self.graph, self.graph.put(operation, *((b, a) if swapped else (a, b))))
 
@@ -75,17 +75,17 @@ class Traced:
 
     def __pow__(self, exponent: Any) -> Traced:
         if exponent != 2:
-            raise TypeError("a traced number has no power but its square")
+            raise TypeError("a traced number supports no power except its square")
         return self * self
 
     def __bool__(self) -> bool:
         raise TypeError("whether a traced number is zero is not known before it has a value")
 
     __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # undecided
-    __hash__ = None  # type: ignore[assignment]  # as nothing is equal
+    __hash__ = None  # type: ignore[assignment]  # because equality is undecided
 
     def function(self, name: str) -> Traced:
-        """negate, sine, cosine, sqrt, log or magnitude of it."""
+        """Return negate, sine, cosine, sqrt, log or magnitude of the number."""
         return Traced(self.graph, self.graph.put(name, self.index))
 
     def __repr__(self) -> str:
@@ -93,12 +93,12 @@ class Traced:
 
 
 class Graph:
-    """Operations in the order in which they came about, each after those that it takes.
+    """Operations in the order of their recording, each after its operands.
 
     Attributes
     ----------
     operations : list of (name, *operands): ("constant", number), ("input", array, entry), ("add", a, b), ("sine", a), ...
-    guards : nodes of ("greater", a, b) or ("at_least", a, b), or 1 or 0 where that is known; they must hold for the results to be trusted
+    guards : nodes of ("greater", a, b) or ("at_least", a, b), or 1 or 0 if already known; they must hold for valid results
     """
 
     def __init__(self) -> None:
@@ -115,30 +115,30 @@ class Graph:
         return found
 
     def constant_of(self, index: int) -> float | None:
-        """The number of a constant, None of other nodes."""
+        """Return the number of a constant, None for other nodes."""
         operation = self.operations[index]
         return operation[1] if operation[0] == CONSTANT else None
 
     def number(self, x: Any) -> Traced:
-        """A constant, or what is traced already."""
+        """Return a constant as traced, and a traced number unchanged."""
         return x if isinstance(x, Traced) else Traced(self, self._node(CONSTANT, float(x) + 0.0))  # no -0
 
     def input(self, array: str, entry: int) -> Traced:
-        """Entry `entry` of an input."""
+        """Return entry `entry` of an input."""
         return Traced(self, self._node(INPUT, array, entry))
 
     def inputs(self, array: str, size: int) -> list[Traced]:
-        """All entries of an input."""
+        """Return all entries of an input."""
         return [self.input(array, i) for i in range(size)]
 
     def guard(self, larger: Any, smaller: Any) -> None:
-        """Results may be trusted only where larger > smaller."""
+        """Add a guard: results are valid only if larger > smaller."""
         node = self.put("greater", self.number(larger).index, self.number(smaller).index)
         if node not in self.guards:
             self.guards.append(node)
 
     def put(self, name: str, *taken: int) -> int:
-        """The node of an operation; an older one where it comes to the same."""
+        """Return the node of an operation, an existing one if the result is the same."""
         folded = getattr(self, "_" + name, None)
         return folded(*taken) if folded else self._function(name, *taken)
 
@@ -161,7 +161,7 @@ class Graph:
         return self._node("negate", a)
 
     def _negated(self, a: int) -> int | None:
-        """What a is the negative of, where it is written as one."""
+        """Return the operand of a if a is a negation."""
         operation = self.operations[a]
         return operation[1] if operation[0] == "negate" else None
 
@@ -184,7 +184,7 @@ class Graph:
         return self._node("add", *sorted((a, b)))
 
     def _are_one(self, a: int, b: int) -> bool:
-        """Whether it is cos x + 2 sin² x/2, which a turn about an axis has along it."""
+        """Return True for cos x + 2 sin² x/2, which occurs along the axis of a rotation."""
         cosine, product = self.operations[a], self.operations[b]
         if cosine[0] != "cosine" or product[0] != "multiply":
             return False
@@ -220,11 +220,11 @@ class Graph:
                 continue
             if factor == 1:
                 return y
-            if factor < 0:  # signs go outward, where sums take them in
+            if factor < 0:  # signs move outward, where sums absorb them
                 return self._negate(self._multiply(self.number(-factor).index, y))
             inner = self.operations[y]
             if inner[0] == "multiply" and self.constant_of(inner[1]) is not None and math.log2(factor) == int(math.log2(factor)):
-                return self._multiply(self._multiply(x, inner[1]), inner[2])  # by a power of two: exact in any order
+                return self._multiply(self._multiply(x, inner[1]), inner[2])  # a power of two: exact in any order
         negatives = self._negated(a), self._negated(b)
         if negatives != (None, None):
             product = self._multiply(*(x if n is None else n for x, n in zip((a, b), negatives, strict=True)))
@@ -245,7 +245,7 @@ class Graph:
         negative = self._negated(a)
         if negative is not None:
             return self._negate(self._divide(negative, b))
-        return self._multiply(a, self._node("divide", self.number(1).index, b))  # one reciprocal, whatever is divided by b
+        return self._multiply(a, self._node("divide", self.number(1).index, b))  # one reciprocal for all divisions by b
 
     def _sqrt(self, a: int) -> int:
         operation = self.operations[a]
@@ -279,7 +279,7 @@ class Graph:
 
     # ------------------------------------------------------------------ what is used
     def needed(self, results: Iterable[int]) -> list[int]:
-        """The nodes that these come from, in order."""
+        """Return the nodes on which these depend, in order."""
         seen, waiting = set(), [*results, *self.guards]
         while waiting:
             node = waiting.pop()
@@ -291,5 +291,5 @@ class Graph:
 
 
 def operands(operation: Sequence[Any]) -> tuple[int, ...]:
-    """The nodes that an operation takes."""
+    """Return the operands of an operation."""
     return () if operation[0] in (CONSTANT, INPUT) else tuple(operation[1:])

@@ -1,4 +1,4 @@
-"""Many runs of a scene, or calls of a function, over samples: on threads, processes or a Dask cluster."""
+"""Ensembles: many runs of a scene, or calls of a function, over samples, on threads, processes or a Dask cluster."""
 
 from . import samples
 from .result import Failure, SweepResult

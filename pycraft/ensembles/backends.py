@@ -1,4 +1,4 @@
-"""Where the runs of a sweep go: threads, processes, a Dask cluster; one after the other the outcomes come back."""
+"""Backends of a sweep: runs go to threads, processes or a Dask cluster, and their outcomes come back one after another."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from ..arguments import whole
 from .work import Outcome, packed, run_in_thread, run_packed
 
 SECONDS = 0.25
-"""How long a handful of runs takes that goes to a worker at once: what is lost with a worker that dies is no more."""
+"""Target duration, s, of the batch of runs sent to a worker at once; a worker that dies loses no more than one batch."""
 LARGEST = 4096
 PATIENCE = 20
-"""Seconds for a scheduler to answer."""
+"""Seconds to wait for a scheduler's answer."""
 WAITING = 2
-"""Handfuls for each worker: one that it has and one that waits."""
+"""Batches for each worker: one running and one waiting."""
 
 Rows = list[tuple[int, Mapping[str, Any]]]
 
 
 class Workers(ABC):
-    """An executor of `concurrent.futures`, made anew when a death has broken it.
+    """An executor of `concurrent.futures`, replaced when a process that dies has broken it.
 
     Parameters
     ----------
-    count : how many runs go on at a time
+    count : number of runs at a time
     """
 
     deadly: tuple[type[BaseException], ...] = ()
-    """What a future raises when the process that had it died."""
+    """Exceptions that a future raises when its process has died."""
     die_together = False
-    """Whether a death takes all futures with it."""
+    """True where one dead process breaks all futures."""
 
     def __init__(self, count: int):
         self.count = count
@@ -45,24 +45,24 @@ class Workers(ABC):
 
     @abstractmethod
     def made(self) -> Executor:
-        """A new executor."""
+        """Return a new executor."""
 
     @abstractmethod
     def submit(self, work: Any, rows: Rows) -> Future:
-        """The outcomes of some rows, in time."""
+        """Submit some rows; return the future of their outcomes."""
 
     def renew(self) -> None:
-        """Another executor in the place of one that a death has broken."""
+        """Replace an executor that a dead process has broken."""
         self.close()
         self.executor = self.made()
 
     def close(self) -> None:
-        """Waits for what goes on; what waits is cancelled."""
+        """Wait for the running batches and cancel the waiting ones."""
         self.executor.shutdown(wait=True, cancel_futures=True)
 
 
 class Threads(Workers):
-    """In this process. A run is in the core, which lets other threads run; effects, events and measures in Python take turns."""
+    """Threads of this process. The core runs without the GIL; effects, events and measures in Python take turns."""
 
     def made(self) -> Executor:
         return ThreadPoolExecutor(self.count, thread_name_prefix="pycraft-sweep")
@@ -72,7 +72,7 @@ class Threads(Workers):
 
 
 class Processes(Workers):
-    """On this machine, each with its own interpreter."""
+    """Processes on this machine, each with its own interpreter."""
 
     deadly = (BrokenProcessPool,)
     die_together = True
@@ -82,14 +82,14 @@ class Processes(Workers):
         super().__init__(count)
 
     def made(self) -> Executor:
-        return ProcessPoolExecutor(self.count, mp_context=get_context("spawn"))  # a fork would have threads' locks and none of the threads
+        return ProcessPoolExecutor(self.count, mp_context=get_context("spawn"))  # a fork would copy the threads' locks without the threads
 
     def submit(self, work: Any, rows: Rows) -> Future:
         return self.executor.submit(run_packed, self._bundle, rows)
 
 
 class Dask(Workers):
-    """A Dask cluster: one of this machine's, the one at an address, or a client's."""
+    """A Dask cluster: a local one, the one at an address, or the cluster of a client."""
 
     def __init__(self, where: Any, workers: int | None, bundle: bytes):
         try:
@@ -109,7 +109,7 @@ class Dask(Workers):
             try:
                 client = Client(where, timeout=PATIENCE)
             except (OSError, ValueError) as error:
-                raise _core.EvaluationError(f"on={where!r}: no Dask scheduler answers there: {error}") from None
+                raise _core.EvaluationError(f"on={where!r}: no Dask scheduler answers at this address: {error}") from None
             self._owned = [client]
         self._client = client
         super().__init__(sum(client.nthreads().values()) or 1)
@@ -121,40 +121,40 @@ class Dask(Workers):
         return self.executor.submit(run_packed, self._bundle, rows)
 
     def close(self) -> None:
-        self.executor.shutdown(wait=False)  # what is left is cancelled with it
+        self.executor.shutdown(wait=False)  # this cancels the remaining futures
         for each in self._owned:
             each.close()
 
 
 def cores() -> int:
-    """The cores that this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def workers_on(on: Any, count: Any, work: Any) -> Workers:
-    """Workers of a kind: "threads", "processes", "dask", an address of a scheduler ("tcp://..."), or a Dask client."""
+    """Return workers of a kind: "threads", "processes", "dask", a scheduler's address ("tcp://..."), or a Dask client."""
     if count is not None and whole(count, "workers") < 1:
-        raise _core.EvaluationError(f"workers={count}: there is one at least")
+        raise _core.EvaluationError(f"workers={count}: at least one worker is needed")
     if on == "threads":
         return Threads(count or cores())
     if on == "processes":
         return Processes(count or cores(), packed(work))
     if isinstance(on, str) and on != "dask" and "://" not in on:
         raise _core.EvaluationError(
-            f'on={on!r}: there are "threads", "processes", "dask", and the address of a Dask scheduler ("tcp://host:8786")'
+            f'on={on!r}: choose "threads", "processes", "dask", or the address of a Dask scheduler ("tcp://host:8786")'
         )
     return Dask(on, count, packed(work))
 
 
 def outcomes(work: Any, rows: Iterator[tuple[int, Mapping[str, Any]]], count: int, workers: Workers) -> Iterator[list[Outcome]]:
-    """Outcomes as they come, some at a time, of so many rows, which are taken as workers get free.
+    """Yield the outcomes of `count` rows in batches, as they finish; rows are sent out as workers become free.
 
-    Where a process died, what it and its kind had is run again, one row at a time: a row whose process then dies is told of as failed,
-    and no other is lost.
+    After a process has died, the rows of the broken batches are run again one at a time. A row whose process dies again is reported as
+    failed; no other row is lost.
     """
     waiting: dict[Future, Rows] = {}
     suspects: deque[Rows] = deque()
-    least = min(work.lanes, -(-count // workers.count))  # runs side by side come together, but no worker stays idle for that
+    least = min(work.lanes, -(-count // workers.count))  # full packs where possible, but no worker stays idle for them
     size = least
     while True:
         alone = bool(suspects) and not waiting
@@ -167,7 +167,7 @@ def outcomes(work: Any, rows: Iterator[tuple[int, Mapping[str, Any]]], count: in
             return
         done, _ = wait(waiting, return_when=FIRST_COMPLETED)
         if any(isinstance(future.exception(), workers.deadly) for future in done) and workers.die_together:
-            done, _ = wait(waiting)  # the others find their pool broken, or were done before
+            done, _ = wait(waiting)  # the others raise the same error, or have finished
         died: list[Rows] = []
         for future in done:
             some = waiting.pop(future)
@@ -179,7 +179,7 @@ def outcomes(work: Any, rows: Iterator[tuple[int, Mapping[str, Any]]], count: in
             elif not isinstance(error, workers.deadly):
                 raise error
             elif alone:
-                yield [Outcome(sample, None, "its process died", 0.0) for sample, _ in some]
+                yield [Outcome(sample, None, "the worker process died", 0.0) for sample, _ in some]
                 died.append([])
             else:
                 died.append(some)
@@ -194,6 +194,6 @@ def _next(rows: Iterator[tuple[int, Mapping[str, Any]]], size: int) -> Rows:
 
 
 def _size(found: list[Outcome], least: int) -> int:
-    """As many rows as take `SECONDS`."""
+    """Return the number of rows that take about `SECONDS`."""
     each = sum(outcome.seconds for outcome in found) / len(found)
     return max(least, min(LARGEST, 8 * len(found), int(SECONDS / max(each, 1e-9))))

@@ -1,9 +1,9 @@
-"""A sweep in a folder: what is finished is on disk, whole, and may be larger than memory.
+"""A sweep in a folder: finished outcomes are on disk and may be larger than memory.
 
-sweep.json          what sweep it is: how many samples, and digests by which another one is refused
+sweep.json          identity of the sweep: number of samples, and digests that tell it from another sweep
 samples.parquet     the samples
-parts/*.parquet     outcomes, some thousands of rows each, as they came
-journal.sqlite      outcomes that are in no part yet: what a process that is killed leaves, the next one reads
+parts/*.parquet     outcomes in order of completion, some thousands of rows each
+journal.sqlite      outcomes that are not in a part yet; after a process is killed, the next one reads them
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from .work import Outcome
 
 FORMAT = "pycraft sweep 1"
 OWN = re.compile(r"sweep\.json(\.new)?|samples\.parquet|parts|(journal|lock)\.sqlite.*")
-"""The names of its files."""
+"""Names of the sweep's own files."""
 ROWS = 65536
-"""Rows of a part at most."""
+"""Largest number of rows of a part."""
 NUMBERS = 4_000_000
-"""And numbers: some tens of megabytes."""
+"""Largest number of values of a part: some tens of megabytes."""
 
 
 class Folder:
-    """Outcomes in a folder. With samples a sweep is begun there, or goes on; without them it is read.
+    """Outcomes in a folder. With samples, a sweep begins or continues there; without samples, the folder is only read.
 
     Raises
     ------
     EvaluationError
-        Another sweep is in the folder; what differs is named.
+        The folder holds another sweep; the message names the differences.
     OSError
-        The folder cannot be written, holds other files, or no sweep.
+        The folder cannot be written, holds other files, or holds no sweep to read.
     """
 
     def __init__(self, path: str | Path, samples: Samples | None = None, work: Any = None, overwrite: bool = False):
@@ -70,19 +70,19 @@ class Folder:
         for table in [self._part(part, ["sample", "error", "seconds"]) for part in self._parts()] + self._unparted():
             self._mark(table)
 
-    # ------------------------------------------------------------------ which sweep it is
+    # ------------------------------------------------------------------ identity of the sweep
     def _refuse_other_files(self) -> None:
-        """What a sweep leaves that was killed while it began is none of them."""
+        """Refuse a folder with other files. Files of a sweep that was killed at its start are not other files."""
         if self.path.is_file() or self.path.is_dir() and any(not OWN.fullmatch(each.name) for each in self.path.iterdir()):
             raise FileExistsError(f"output {str(self.path)!r} is a file, or a folder with other files; give a new or an empty folder")
 
     def _locked(self) -> sqlite3.Connection:
-        """Held while a sweep is at work here; a process that dies gives it back."""
+        """Return the lock held while a sweep writes here; it is released when the process dies."""
         lock = sqlite3.connect(self.path / "lock.sqlite", timeout=1.0, check_same_thread=False, isolation_level=None)
         try:
             lock.execute("BEGIN EXCLUSIVE")
         except sqlite3.OperationalError:
-            raise _core.EvaluationError(f"output {str(self.path)!r}: another sweep is at work in this folder") from None
+            raise _core.EvaluationError(f"output {str(self.path)!r}: another sweep is writing to this folder") from None
         return lock
 
     def _begin(self, work: Any) -> dict[str, Any]:
@@ -109,7 +109,9 @@ class Folder:
         except (OSError, ValueError):
             raise FileNotFoundError(f"{str(self.path)!r} holds no sweep") from None
         if about.get("format") != FORMAT:
-            raise _core.EvaluationError(f"{str(self.path)!r} holds a sweep of another version, {about.get('format')!r}, not {FORMAT!r}")
+            raise _core.EvaluationError(
+                f"{str(self.path)!r} holds a sweep in the format {about.get('format')!r}; this version reads {FORMAT!r}"
+            )
         return about
 
     def _refuse_another(self, samples: Samples, work: Any) -> None:
@@ -133,7 +135,7 @@ class Folder:
 
     # ------------------------------------------------------------------ outcomes
     def add(self, outcomes: list[Outcome]) -> None:
-        """Keep some outcomes: they are on disk when this returns."""
+        """Store some outcomes; they are on disk when this returns."""
         before = dict(self.shapes.known)
         checked = [self.shapes.checked(each, self.samples) for each in outcomes]
         if self.shapes.known != before:
@@ -173,7 +175,7 @@ class Folder:
         return self._arrow.table(columns)
 
     def _numbers(self, x: np.ndarray) -> Any:
-        """Doubles: a column of them, or of lists of one length."""
+        """Return a column of doubles, or of lists of doubles of one length."""
         flat = self._arrow.array(np.ascontiguousarray(x, float).ravel())
         return flat if x.ndim == 1 else self._arrow.FixedSizeListArray.from_arrays(flat, int(np.prod(x.shape[1:])))
 
@@ -184,14 +186,14 @@ class Folder:
         self.errors |= {int(sample): error for sample, error in zip(at, errors, strict=True) if error is not None}
 
     def _unparted(self) -> list[Any]:
-        """The tables of the journal."""
+        """Return the tables in the journal."""
         rows = self._journal.execute("SELECT rows FROM finished ORDER BY rowid").fetchall()
         tables = [self._arrow.ipc.open_stream(each).read_all() for (each,) in rows]
         self._waiting = sum(len(table) for table in tables)
         return tables
 
     def _to_parts(self) -> None:
-        """The journal becomes a part. A kill between the two steps leaves rows in both, which are the same."""
+        """Move the journal to a new part. A kill between the two steps leaves the same rows in both, which is harmless."""
         tables = self._unparted()
         if tables:
             number = 1 + max((int(part.stem) for part in self._parts()), default=-1)
@@ -210,7 +212,7 @@ class Folder:
         return self._arrow.parquet.read_table(part, columns=there)
 
     def column(self, name: str) -> np.ndarray:
-        """A value of all runs, read from the parts; no other column is."""
+        """Return one value of all runs, reading only this column of the parts."""
         shape = self.shapes.known[name]
         column = empty_column(shape, self.samples.count)
         for table in [self._part(part, ["sample", name]) for part in self._parts()] + self._unparted():
@@ -220,19 +222,19 @@ class Folder:
         return column
 
     def flush(self) -> None:
-        """What is in the journal goes to a part; other sweeps may be at work here again."""
+        """Move the journal to a part and release the lock on the folder."""
         self._to_parts()
         if self._lock is not None:
             self._lock.close()
             self._lock = None
 
     def close(self) -> None:
-        """The folder is read no more."""
+        """Close the folder."""
         self._journal.close()
 
 
 def _array(column: Any, shape: list[int]) -> np.ndarray:
-    """A column of Arrow as an array (n, *shape)."""
+    """Return an Arrow column as an array (n, *shape)."""
     if not shape:
         return column.to_numpy().astype(float)
     flat = column.combine_chunks().flatten() if column.num_chunks != 1 else column.chunk(0).flatten()
@@ -244,13 +246,13 @@ def _label(value: Any) -> str:
 
 
 def _digests(samples: Samples, work: Any) -> dict[str, str]:
-    """By which the same sweep is known."""
+    """Return the digests that identify a sweep."""
     parts = {"samples": samples, **work.parts()}
     return {name: sha256(pickle.dumps(_told(part), protocol=4)).hexdigest() for name, part in parts.items()}
 
 
 def _told(value: Any) -> Any:
-    """As plain data, functions by their names: the same in every process."""
+    """Return plain data, the same in every process; functions are given by their names."""
     if hasattr(value, "description"):
         return _told(value.description())
     if isinstance(value, Scene):
@@ -278,5 +280,7 @@ def _pyarrow() -> Any:
         import pyarrow.ipc
         import pyarrow.parquet
     except ImportError:
-        raise ImportError("a sweep is kept in a folder by pyarrow: extra [data]; without output= it stays in memory") from None
+        raise ImportError(
+            "output= needs pyarrow to write the folder: install the extra [data], or leave output out to keep the sweep in memory"
+        ) from None
     return pyarrow

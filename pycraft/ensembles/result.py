@@ -1,4 +1,4 @@
-"""What a sweep found: by sample, the values of its runs, and why some have none."""
+"""Result of a sweep: the values of its runs by sample, and the reasons of failed runs."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Failure:
 class SweepResult(Mapping[str, np.ndarray]):
     """Values of all runs by name, in the order of samples: arrays (n, ...), NaN where a run failed or is not finished.
 
-    Those of a folder are read when they are asked for, one name at a time.
+    Values of a sweep in a folder are read on demand, one name at a time.
 
     Attributes
     ----------
     samples : Samples
-    finished : (n,) bool, whether there is an outcome, failures among them
-    seconds : (n,) s, what each run took
+    finished : (n,) bool, True for runs with an outcome, failures included
+    seconds : (n,) s, duration of each run
 
     Examples
     --------
@@ -48,14 +48,14 @@ class SweepResult(Mapping[str, np.ndarray]):
 
     @property
     def failures(self) -> list[Failure]:
-        """The runs that failed, in the order of samples."""
+        """Failed runs, in the order of samples."""
         return [Failure(i, self.samples.row(i), self._store.errors[i]) for i in sorted(self._store.errors)]
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name in self.samples and name not in self._store.shapes.known:
             return self.samples[name]
         if name not in self._store.shapes.known:
-            raise KeyError(f"the sweep has no {name!r}; there are {', '.join([*self.samples, *self])}")
+            raise KeyError(f"the sweep has no value {name!r}; its values are {', '.join([*self.samples, *self])}")
         return self._store.column(name)
 
     def __iter__(self) -> Iterator[str]:
@@ -65,11 +65,14 @@ class SweepResult(Mapping[str, np.ndarray]):
         return len(self._store.shapes.known)
 
     def explain(self) -> str:
-        """How the runs are done: side by side in packs of states, or one by one, and why."""
+        """Return how the runs are executed, side by side in packs of states or one by one, and why."""
         return f"{self.samples.count} runs, {self._how}"
 
     def to_dataframe(self) -> Any:
-        """A row a sample: inputs, values (arrays by component), error, seconds. ImportError where pandas is missing (extra [data])."""
+        """Return a DataFrame, one row per sample: inputs, values (arrays by component), error, seconds.
+
+        Raises ImportError if pandas is missing (extra [data]).
+        """
         from pandas import DataFrame
 
         columns: dict[str, Any] = {}
@@ -83,7 +86,7 @@ class SweepResult(Mapping[str, np.ndarray]):
         return DataFrame({**columns, "error": errors, "seconds": self.seconds}).rename_axis("sample")
 
     def to_xarray(self) -> Any:
-        """An xarray Dataset over "sample". ImportError where xarray is missing (extra [data])."""
+        """Return an xarray Dataset over "sample". Raises ImportError if xarray is missing (extra [data])."""
         from xarray import Dataset
 
         def axes(name: str, values: Any) -> tuple[Any, ...]:

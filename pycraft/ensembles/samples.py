@@ -1,4 +1,4 @@
-"""Samples of a sweep: what changes from run to run, by name, one row a run."""
+"""Samples of a sweep: the inputs that change from run to run, by name, one row per run."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ..arguments import listed, seed_of, whole
 
 
 class Samples(Mapping[str, Any]):
-    """Values by name, one of each for every run: arrays (n, ...) of numbers, or lists of anything else.
+    """Values by name, one for each run: arrays (n, ...) of numbers, or lists of other objects.
 
-    For a sweep of a scene the names say what is set (docs/ensembles.md): "q", "v", "q.elbow", "bodies.hand.mass",
-    "effects.damping.coefficient", "effects.gravity.g[2]". For a sweep of a function they are its arguments.
+    In a sweep of a scene each name is the parameter or coordinate to set (docs/ensembles.md): "q", "v", "q.elbow", "bodies.hand.mass",
+    "effects.damping.coefficient", "effects.gravity.g[2]". In a sweep of a function the names are its arguments.
 
     Parameters
     ----------
-    values : a mapping of names to n values each; a NumPy array's first axis counts them
+    values : mapping of names to n values each; the first axis of a NumPy array counts the runs
 
     Attributes
     ----------
@@ -35,15 +35,17 @@ class Samples(Mapping[str, Any]):
 
     def __init__(self, values: Mapping[str, Any]):
         if not isinstance(values, Mapping) or not values:
-            raise _core.ModelError('samples: a mapping of names to values, one for each run: {"q.elbow": [0.1, 0.2]}')
+            raise _core.ModelError('samples must map names to values, one for each run, such as {"q.elbow": [0.1, 0.2]}')
         self._values = {str(name): _values(name, given) for name, given in values.items()}
         counts = {name: len(given) for name, given in self._values.items()}
         if len(set(counts.values())) > 1:
-            raise _core.ModelError(f"samples: as many values of each name, not {', '.join(f'{n} of {name}' for name, n in counts.items())}")
+            raise _core.ModelError(
+                f"samples: every name needs the same number of values; got {', '.join(f'{n} of {name}' for name, n in counts.items())}"
+            )
         self.count: int = next(iter(counts.values()))
 
     def row(self, i: int) -> dict[str, Any]:
-        """The values of run i."""
+        """Return the values of run i."""
         return {name: _item(values[i]) for name, values in self._values.items()}
 
     def __getitem__(self, name: str) -> Any:
@@ -56,10 +58,10 @@ class Samples(Mapping[str, Any]):
         return len(self._values)
 
     def __or__(self, other: Mapping[str, Any]) -> Samples:
-        """Both, of one count."""
+        """Return the samples of both; they must have the same count."""
         both = set(self) & set(other)
         if both:
-            raise _core.ModelError(f"samples: {', '.join(sorted(both))} is in both")
+            raise _core.ModelError(f"samples: {', '.join(sorted(both))} occurs in both sets of samples")
         return Samples({**self, **other})
 
     def __repr__(self) -> str:
@@ -67,30 +69,30 @@ class Samples(Mapping[str, Any]):
 
 
 def grid(values: Mapping[str, Any]) -> Samples:
-    """Every combination of the values of each name; the last name changes fastest."""
+    """Return every combination of the values of each name; the last name changes fastest."""
     axes = [_values(name, given) for name, given in values.items()]
     places = np.indices([len(axis) for axis in axes]).reshape(len(axes), -1)
     return Samples({name: _taken(axis, at) for name, axis, at in zip(values, axes, places, strict=True)})
 
 
 def random(count: int, ranges: Mapping[str, Any], *, seed: int | np.random.Generator = 0) -> Samples:
-    """Independent draws.
+    """Return independent random draws.
 
     Parameters
     ----------
     count : n
-    ranges : by name a pair (low, high) of numbers, between which all are as likely; a list of values, of which all are as likely; or a
+    ranges : by name, a pair (low, high) for a uniform distribution between two numbers; a list of equally likely values; or a
         frozen distribution of SciPy, such as `scipy.stats.norm(2.0, 0.1)`
-    seed : of the draws
+    seed : seed of the random draws
     """
     return _drawn(_count(count), ranges, seed_of(seed).random((_count(count), len(ranges))))
 
 
 def sobol(count: int, ranges: Mapping[str, Any], *, seed: int | np.random.Generator = 0) -> Samples:
-    """Points of a scrambled Sobol sequence (`scipy.stats.qmc`), which fill a box more evenly than draws do: means of smooth functions
-    converge about as 1/n, where those of draws do as 1/√n. A power of two is the count that it is balanced for.
+    """Return points of a scrambled Sobol sequence (`scipy.stats.qmc`), which fill a box more evenly than random draws: means of smooth
+    functions converge about as 1/n, against 1/√n for random draws. The sequence is balanced when the count is a power of two.
 
-    Parameters are those of `random`.
+    Parameters as for `random`.
     """
     from scipy.stats import qmc
 
@@ -98,7 +100,7 @@ def sobol(count: int, ranges: Mapping[str, Any], *, seed: int | np.random.Genera
 
 
 def states(model: Any, count: int, *, seed: int | np.random.Generator = 0) -> Samples:
-    """States of a model as `Multibody.random_state` draws them, rotations among them: "q" (n, nq) and "v" (n, nv)."""
+    """Return random states of a model, drawn as by `Multibody.random_state` (rotations included): "q" (n, nq) and "v" (n, nv)."""
     generator = seed_of(seed)
     drawn = [model.random_state(generator) for _ in range(_count(count))]
     return Samples({"q": np.stack([state.q for state in drawn]), "v": np.stack([state.v for state in drawn])})
@@ -109,19 +111,19 @@ def states(model: Any, count: int, *, seed: int | np.random.Generator = 0) -> Sa
 
 def _count(count: Any) -> int:
     if whole(count, "count") < 1:
-        raise _core.ModelError(f"count={count}: there is one sample at least")
+        raise _core.ModelError(f"count={count}: at least one sample is needed")
     return int(count)
 
 
 def _values(name: Any, given: Any) -> Any:
-    """Numbers as an array of doubles, anything else as a list."""
+    """Return numbers as an array of doubles, anything else as a list."""
     if not isinstance(given, np.ndarray):
         given = listed(given, f"samples of {name!r}")
     if not len(given):
-        raise _core.ModelError(f"samples of {name!r}: there is one value at least")
+        raise _core.ModelError(f"samples of {name!r}: at least one value is needed")
     try:
         numbers = np.asarray(given)
-    except ValueError:  # rows of several lengths
+    except ValueError:  # rows of different lengths
         return list(given)
     return numbers.astype(float) if numbers.dtype.kind in "fiu" else list(given)
 
@@ -145,9 +147,11 @@ def _quantile(name: str, given: Any) -> Callable[[np.ndarray], Any]:
     if isinstance(given, tuple) and len(given) == 2:
         low, high = (float(_core.real_array(end, f"range of {name!r}")) for end in given)
         if not (-np.inf < low <= high < np.inf):
-            raise _core.ModelError(f"range of {name!r}: (low, high), two finite numbers in this order, not {given}")
+            raise _core.ModelError(f"range of {name!r}: give (low, high), two finite numbers with low <= high, not {given}")
         return lambda u: low + (high - low) * u
     if isinstance(given, Sequence) and not isinstance(given, (str, tuple)) and len(given):
         values = _values(name, given)
         return lambda u: _taken(values, np.minimum((u * len(values)).astype(int), len(values) - 1))
-    raise _core.ModelError(f"range of {name!r}: (low, high), a list of values, or a frozen distribution of scipy.stats, not {given!r:.60}")
+    raise _core.ModelError(
+        f"range of {name!r}: give (low, high), a list of values, or a frozen distribution of scipy.stats, not {given!r:.60}"
+    )

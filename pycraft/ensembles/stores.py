@@ -1,4 +1,4 @@
-"""Where the outcomes of a sweep are kept while it runs: in memory, or in a folder (`folder.py`)."""
+"""Storage of the outcomes of a sweep while it runs: in memory, or in a folder (`folder.py`)."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from .work import Outcome
 
 
 class Shapes:
-    """What the values of a sweep are, by name: the shape of numbers and arrays, else "truth" or "text". All runs have the same."""
+    """Kinds of the values of a sweep by name: the shape of numbers and arrays, else "truth" or "text". They are the same in all runs."""
 
     def __init__(self, known: Mapping[str, Any] | None = None):
         self.known: dict[str, Any] = dict(known or {})
 
     def checked(self, outcome: Outcome, taken: Samples) -> Outcome:
-        """The outcome, or a failure where its values are not like those of the runs before."""
+        """Return the outcome, or a failure if its values do not have the kinds of the earlier runs."""
         if outcome.values is None:
             return outcome
         shapes = {name: _shape(value) for name, value in outcome.values.items()}
         if not self.known:
             if doubled := set(shapes) & {*taken, *RESERVED}:
-                raise _core.EvaluationError(f"a measure calls a value {min(doubled)!r}, which is taken; call it otherwise")
+                raise _core.EvaluationError(f"a measure names a value {min(doubled)!r}, a reserved name; choose another name")
             self.known = shapes
         if shapes == self.known:
             return outcome
         names = [name for name in {**self.known, **shapes} if shapes.get(name) != self.known.get(name)]
-        told = ", ".join(f"{name} {_told(shapes.get(name))} and not {_told(self.known.get(name))}" for name in names)
-        return Outcome(outcome.sample, None, f"values unlike those of the first run: {told}", outcome.seconds)
+        told = ", ".join(f"{name} is {_told(shapes.get(name))}, not {_told(self.known.get(name))}" for name in names)
+        return Outcome(outcome.sample, None, f"values of another kind than in the first run: {told}", outcome.seconds)
 
 
 RESERVED = ("sample", "error", "seconds")
-"""Columns that every sweep has."""
+"""Columns present in every sweep."""
 
 
 def _shape(value: Any) -> Any:
@@ -47,7 +47,7 @@ def _told(shape: Any) -> str:
 
 
 def empty_column(shape: Any, count: int) -> np.ndarray:
-    """As a column is before any run is finished: NaN, and None of what is no number."""
+    """Return a column before any run is finished: NaN for numbers, None for other values."""
     return np.full((count, *shape), np.nan) if isinstance(shape, list) else np.full(count, None, object)
 
 
@@ -62,7 +62,7 @@ class Memory:
         self._columns: dict[str, np.ndarray] = {}
 
     def add(self, outcomes: list[Outcome]) -> None:
-        """Keep some outcomes."""
+        """Store some outcomes."""
         for outcome in (self.shapes.checked(each, self.samples) for each in outcomes):
             self.finished[outcome.sample], self.seconds[outcome.sample] = True, outcome.seconds
             if outcome.values is None:
@@ -74,11 +74,11 @@ class Memory:
                 self._columns[name][outcome.sample] = value
 
     def column(self, name: str) -> np.ndarray:
-        """A value of all runs."""
+        """Return one value of all runs."""
         return self._columns[name]
 
     def flush(self) -> None:
         """Nothing waits."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file is open."""

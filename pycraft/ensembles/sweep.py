@@ -1,4 +1,4 @@
-"""Many runs: a scene or a function over samples, on threads, processes or a Dask cluster."""
+"""Sweeps: run a scene or a function over samples, on threads, processes or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -33,40 +33,40 @@ def sweep(
     progress: bool = True,
     **options: Any,
 ) -> SweepResult:
-    """Run a scene from every sample, or call a function with it.
+    """Run a scene for every sample, or call a function with every sample.
 
     Parameters
     ----------
     work : Scene, or a function of the samples' names that returns numbers, truths or texts by name, or one of them ("value")
     samples : by name, one value for each run (`pycraft.samples`)
-        Of a scene: "q", "v", "q.HINGE", "v.HINGE" at the start (or a coordinate's name), "bodies.BODY.mass" and what else of bodies and
-        hinges can be set, "effects.EFFECT.PARAMETER", and components, "effects.gravity.g[2]". What no sample names is as the scene has it.
-    T : s, how long each run of a scene is
-    measure : what of a `Run` is kept: a function that gives numbers and arrays by name, of one shape in all runs
-        Left out: "end.t", "end.q", "end.v", "steps" and "balance", and with t_eval "run.t", "run.q", "run.v" too.
-    output : a folder, for results that outlive the process and may be larger than memory (Parquet; extra [data])
-        A sweep that was stopped goes on there when it is called again; what is finished is not run again. None: in memory.
+        For a scene: "q", "v", "q.HINGE", "v.HINGE" at the start (or a coordinate's name), "bodies.BODY.mass" and the other parameters of
+        bodies and hinges, "effects.EFFECT.PARAMETER", and components, "effects.gravity.g[2]". The rest is as in the scene.
+    T : s, duration of each run of a scene
+    measure : function of a `Run` that returns the values to keep: numbers and arrays by name, with the same shapes in all runs
+        Default: "end.t", "end.q", "end.v", "steps" and "balance", and with t_eval also "run.t", "run.q", "run.v".
+    output : folder for results that outlive the process and may be larger than memory (Parquet; extra [data]); None keeps them in memory
+        Calling again continues a stopped sweep; finished runs are not repeated.
     on : {"threads", "processes", "dask"}, the address of a Dask scheduler ("tcp://host:8786"), or a `dask.distributed.Client`
-    workers : how many; as many as cores where left out
-    overwrite : bool, whether another sweep in the folder is thrown away
-    progress : bool, whether a sweep of more than a second shows how far it is and how long it will take
-    options : of `Scene.simulate`: integrator, rtol, atol, step, t_eval, events, ...
+    workers : number of workers; default: number of cores
+    overwrite : bool, True deletes another sweep in the folder
+    progress : bool, True shows progress and the time remaining for sweeps longer than a second
+    options : options of `Scene.simulate`: integrator, rtol, atol, step, t_eval, events, ...
 
     Returns
     -------
     SweepResult
-        A run that failed has its reason in `failures`; the others go on. A worker that dies loses no finished run; what it had is run
-        again.
-        Ctrl-C and errors keep what is finished: it is the error's attribute `result`.
+        `failures` has the reason of each failed run; the other runs continue. A worker that dies loses no finished run; its unfinished
+        runs are repeated.
+        After Ctrl-C or an error, the attribute `result` of the exception holds the finished runs.
 
     Raises
     ------
     ModelError
-        A name of samples that nothing has, with the nearest.
+        A name of samples that nothing in the scene has; the message suggests the nearest.
     EvaluationError
-        Options that make no sense; another sweep in the folder; functions that do not go to another process.
+        Invalid options; another sweep in the folder; functions that cannot be sent to another process.
     OSError
-        A folder that cannot be written.
+        The folder cannot be written.
     """
     samples = samples if isinstance(samples, Samples) else Samples(samples)
     doing = _work(work, samples, T, measure, options)
@@ -87,7 +87,7 @@ def sweep(
                     store.add(found)
                     bar.add(len(found), sum(each.error is not None for each in found))
     except BaseException as error:
-        error.result = result  # type: ignore[attr-defined]  # what is finished
+        error.result = result  # type: ignore[attr-defined]  # the finished runs
         raise
     finally:
         if crew is not None:
@@ -97,28 +97,28 @@ def sweep(
 
 
 def load_sweep(folder: str | Path) -> SweepResult:
-    """The sweep in a folder, finished or not. Its models and other objects among the samples are their names."""
+    """Return the sweep in a folder, finished or not. Models and other objects among its samples are replaced by their names."""
     return SweepResult(Folder(folder))
 
 
 def _work(work: Any, samples: Samples, T: Any, measure: Any, options: dict[str, Any]) -> Any:
-    """What is done for each sample; refused here, before the first, if it makes no sense."""
+    """Return the work for each sample. Invalid work is refused here, before the first run."""
     if isinstance(work, Scene):
         if T is None:
-            raise _core.EvaluationError("a sweep of a scene takes T, how long each run is, in seconds")
+            raise _core.EvaluationError("a sweep of a scene needs T, the duration of each run in seconds")
         run_times(0.0, T, options.get("t_eval"))
         RunOptions.checked(**{**DEFAULTS, **{name: value for name, value in options.items() if name in DEFAULTS}})
         known = [*DEFAULTS, "t_eval", "events", "dense"]
         if unknown := set(options) - set(known):
-            raise _core.EvaluationError(f"Scene.simulate has no {min(unknown)!r}; there are {', '.join(known)}")
+            raise _core.EvaluationError(f"Scene.simulate has no option {min(unknown)!r}; its options are {', '.join(known)}")
         if measure is None:
             measure = trajectory if "t_eval" in options else end_of_run
             options = {"t_eval": [0.0, one_number(T, "T")], "dense": False, **options}
         Targets(work, samples)
-        work._warn_of_gravity()  # here, and not by every worker
+        work._warn_of_gravity()  # once here, not in every worker
         return SceneWork(work, list(samples), one_number(T, "T"), options, measure)
     if not callable(work):
-        raise _core.ModelError(f"a sweep is of a scene or of a function, not of {work!r:.60}")
+        raise _core.ModelError(f"sweep takes a scene or a function, not {work!r:.60}")
     if T is not None or measure is not None or options:
-        raise _core.EvaluationError("T, measure and options are of a sweep of a scene; a function has its samples alone")
+        raise _core.EvaluationError("T, measure and options apply to sweeps of a scene; a function takes only its samples")
     return FunctionWork(work)

@@ -1,4 +1,4 @@
-"""What a sample sets in a scene: coordinates at the start, parameters of the model and of effects, by the names of samples."""
+"""Targets of samples in a scene: initial coordinates, and parameters of the model and of effects, by name."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _INDEX = re.compile(r"^(?P<path>.*?)\[(?P<index>\d+(?:\s*,\s*\d+)*)\]$")
 
 
 class Targets:
-    """The names of samples as what they set in one scene.
+    """Targets in one scene of the names of samples.
 
-    ModelError for a name that nothing in the scene has, with the nearest.
+    Raises ModelError for a name that nothing in the scene has, and suggests the nearest.
     """
 
     def __init__(self, scene: Any, names: Iterable[str]):
@@ -29,7 +29,7 @@ class Targets:
         _once(self._states)
 
     def set(self, row: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-        """Sets the parameters of a sample; returns its q and v at the start, those of the model where it says none."""
+        """Set the parameters of a sample; return q and v at the start, the model's own where the sample gives none."""
         for name, setter in self._setters.items():
             setter(row[name])
         model = self._scene.model
@@ -43,7 +43,7 @@ class Targets:
 
 
 def _once(states: Mapping[str, tuple[str, slice]]) -> None:
-    """No coordinate has two values."""
+    """Refuse samples that set a coordinate twice."""
     taken: dict[tuple[str, int], str] = {}
     for name, (of, at) in states.items():
         for i in range(at.start, at.stop):
@@ -52,7 +52,7 @@ def _once(states: Mapping[str, tuple[str, slice]]) -> None:
 
 
 def _places(model: Any, name: str) -> tuple[str, slice]:
-    """q or v, and where in it."""
+    """Return "q" or "v", and the slice of it."""
     of, _, which = name.partition(".")
     if not which:
         return of, slice(0, model.nq if of == "q" else model.nv)
@@ -67,7 +67,7 @@ def _places(model: Any, name: str) -> tuple[str, slice]:
 
 
 def _setter(scene: Any, name: str) -> Callable[[Any], None]:
-    """What sets bodies.NAME.ATTRIBUTE, hinges.NAME.ATTRIBUTE or effects.NAME.PARAMETER, or one component of it."""
+    """Return the function that sets bodies.NAME.ATTRIBUTE, hinges.NAME.ATTRIBUTE or effects.NAME.PARAMETER, or one component of it."""
     indexed = _INDEX.match(name)
     path = indexed["path"] if indexed else name
     index = tuple(int(i) for i in indexed["index"].split(",")) if indexed else None
@@ -76,11 +76,11 @@ def _setter(scene: Any, name: str) -> Callable[[Any], None]:
     owners = {"bodies": scene.model.bodies, "hinges": scene.model.hinges, "effects": scene.effects}
     if room not in owners or not of:
         raise _core.ModelError(
-            f"samples: {name!r} is nothing that a scene has; write q.HINGE, v.HINGE, bodies.BODY.mass, hinges.HINGE.rotor_inertia or "
+            f"samples: a scene has no {name!r}; write q.HINGE, v.HINGE, bodies.BODY.mass, hinges.HINGE.rotor_inertia or "
             "effects.EFFECT.PARAMETER"
         )
     if of not in owners[room]:
-        raise _core.ModelError(f"samples: {name!r}: there is no {of!r} among the {room}; {_near(of, list(owners[room]))}")
+        raise _core.ModelError(f"samples: {name!r}: the scene's {room} include no {of!r}; {_near(of, list(owners[room]))}")
     owner = owners[room][of]
     known = [each for each in dir(owner) if not each.startswith("_") and settable(type(owner), each)]
     if attribute not in known:
@@ -103,4 +103,4 @@ def _setter(scene: Any, name: str) -> Callable[[Any], None]:
 
 def _near(name: str, names: list[str]) -> str:
     near = get_close_matches(name, names, 1)
-    return f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names[:12])}{', ...' if len(names) > 12 else ''}"
+    return f"did you mean {near[0]!r}?" if near else f"available: {', '.join(names[:12])}{', ...' if len(names) > 12 else ''}"

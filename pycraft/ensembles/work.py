@@ -1,4 +1,4 @@
-"""What a sweep does for one sample, and for a handful of them in one go."""
+"""Work of a sweep for one sample, or for a batch of samples at once."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ Values = Mapping[str, Any]
 Rows = Sequence[tuple[int, Values]]
 
 DEFAULTS: dict[str, Any] = {
-    "integrator": "dopri5", "rtol": 1e-9, "atol": 1e-12, "step": None, "max_step": None, "normalise": "never", "energy": True,
+    "integrator": "auto", "rtol": 1e-9, "atol": 1e-12, "step": None, "max_step": None, "normalise": "never", "energy": True,
 }  # fmt: skip
 """Of `Scene.simulate`."""
 PACKS = 32
-"""Runs for each lane that are prepared, run and measured in one go: enough that lanes seldom wait for the last ones, few enough to keep."""
+"""Runs per lane that are prepared, run and measured at once: enough that lanes seldom idle at the end, few enough to keep in memory."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a sample: its values, or why there are none."""
+    """Outcome of a sample: its values, or the reason of its failure."""
 
     sample: int
     values: Values | None
@@ -43,22 +43,22 @@ class Outcome:
 
 
 def end_of_run(run: Any) -> dict[str, Any]:
-    """What is kept of a run where nothing else is asked for: its end, its steps, and, where works were kept account of, how far the energy
-    balance went from where it began, J."""
+    """Return the default values of a run: its end, its number of steps and, where works were recorded, the largest drift of the energy
+    balance, J."""
     kept: dict[str, Any] = {"end.t": run.t[-1], "end.q": run.q[-1], "end.v": run.v[-1], "steps": run.statistics["steps"]}
-    with suppress(_core.EvaluationError):  # of a run without works
+    with suppress(_core.EvaluationError):  # a run without works
         kept["balance"] = run.balance[-1] - run.balance[0]
     return kept
 
 
 def trajectory(run: Any) -> dict[str, Any]:
-    """The end of a run, and "run.t" (K,), "run.q" (K, nq), "run.v" (K, nv) at all its times, which all runs share: those of t_eval."""
+    """Return the end of a run, and "run.t" (K,), "run.q" (K, nq), "run.v" (K, nv) at the times t_eval, which all runs share."""
     return {**end_of_run(run), "run.t": run.t, "run.q": run.q, "run.v": run.v}
 
 
 @dataclass
 class SceneWork:
-    """A run of a scene from each sample, and what is measured of it."""
+    """A run of a scene for each sample, and the values measured from it."""
 
     scene: Scene
     names: list[str]
@@ -66,37 +66,37 @@ class SceneWork:
     options: dict[str, Any]
     measure: Callable[[Any], Values]
     _targets: Targets | None = field(default=None, init=False, repr=False, compare=False)
-    _known: Any = field(default=None, init=False, repr=False, compare=False)  # calls that are for packs
+    _known: Any = field(default=None, init=False, repr=False, compare=False)  # calls suited to packs
     _lanes: int = field(default=0, init=False, repr=False, compare=False)
 
     def __call__(self, row: Values) -> Values:
         if self._targets is None:
             self._targets = Targets(self.scene, self.names)
         q, v = self._targets.set(row)
-        self.scene._limits_said = True  # a sweep has thousands of runs; `crossed_limits` of each says them
-        self.scene._doubts_said = {"energy", "atol"}  # the balance is among what each keeps
+        self.scene._limits_said = True  # a sweep has thousands of runs; `crossed_limits` of each run lists them
+        self.scene._doubts_said = {"energy", "atol"}  # the balance is among the default values
         return self.measure(self.scene.simulate(self.T, q, v, progress=False, **self.options))
 
     def __post_init__(self) -> None:
         self._run = RunOptions.checked(**{**DEFAULTS, **{name: value for name, value in self.options.items() if name in DEFAULTS}})
 
     def one_by_one(self) -> str:
-        """Why runs are not side by side in packs of states, in words; "" if they are."""
+        """Return why runs are not executed side by side in packs of states; "" if they are."""
         if self.options.get("events"):
-            return "events are looked for"
+            return "the runs look for events"
         if edits := [name for name in self.names if name.partition(".")[0] in ("bodies", "hinges")]:
-            return f"samples set {edits[0]!r}, and packs are of one model"
+            return f"samples set {edits[0]!r}, and a pack shares one model"
         return alone(self.scene._calls(), self._run)
 
     @property
     def lanes(self) -> int:
-        """How many runs are side by side."""
+        """Number of runs side by side."""
         if self._lanes == 0:
             self._lanes = 1 if self.one_by_one() else _core.pack_width()
         return self._lanes
 
     def together(self, rows: Rows) -> list[Outcome]:
-        """`run_rows`, in packs of states where a sample allows it."""
+        """Do `run_rows`, in packs of states where the samples allow it."""
         each = PACKS * self.lanes
         return [outcome for i in range(0, len(rows), each) for outcome in self._some(rows[i : i + each])]
 
@@ -125,7 +125,7 @@ class SceneWork:
         return outcomes
 
     def _prepared(self, row: Values) -> tuple[Any, np.ndarray, np.ndarray] | None:
-        """The scene as a sample has it, compiled, with its state; None if the sample makes something of it that is not for packs."""
+        """Return the scene of a sample, compiled, and its state; None if the sample's scene is not suited to packs."""
         if self._targets is None:
             self._targets = Targets(self.scene, self.names)
         q, v = at_state(self.scene.model, *self._targets.set(row))
@@ -143,14 +143,14 @@ class SceneWork:
         return self.measure(run)
 
     def own(self) -> SceneWork:
-        """The same with a scene and a model of its own, as it sets them."""
+        """Return a copy with its own scene and model, because samples modify them."""
         return SceneWork(copy.deepcopy(self.scene), self.names, self.T, self.options, self.measure)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return SceneWork, (self.scene, self.names, self.T, self.options, self.measure)
 
     def parts(self) -> dict[str, Any]:
-        """What makes two sweeps the same."""
+        """Return the parts that identify a sweep."""
         return {"scene": self.scene, "T": self.T, "options": self.options, "measure": self.measure}
 
 
@@ -167,8 +167,8 @@ class FunctionWork:
     lanes = 1
 
     def one_by_one(self) -> str:
-        """Why they are not side by side."""
-        return "they are calls of a function"
+        """Return why calls are not executed side by side."""
+        return "they call a function"
 
     def own(self) -> FunctionWork:
         return self
@@ -178,14 +178,14 @@ class FunctionWork:
 
 
 def run_rows(work: Any, rows: Rows) -> list[Outcome]:
-    """The outcomes of some samples, one after the other or side by side; an error of one is told of it and ends no other."""
+    """Yield the outcomes of some samples, run one after another or side by side; an error of one stops no other."""
     if len(rows) > 1 and work.lanes > 1:
         return work.together(rows)
     return [run_row(work, *row) for row in rows]
 
 
 def run_row(work: Any, sample: int, row: Values) -> Outcome:
-    """The outcome of one sample."""
+    """Return the outcome of one sample."""
     return _outcome(sample, lambda: work(row), 0.0)
 
 
@@ -205,11 +205,11 @@ def _told(error: Exception) -> str:
 def _named(found: Any) -> Values:
     if isinstance(found, Mapping):
         return found
-    raise _core.EvaluationError(f"a measure gives a dictionary of numbers by name, not {found!r:.60}")
+    raise _core.EvaluationError(f"measure must return a dictionary of values by name, not {found!r:.60}")
 
 
 def _kept(name: Any, value: Any) -> Any:
-    """A number, a truth, a text, or an array of doubles."""
+    """Return a number, a truth, a text, or an array of doubles."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if isinstance(value, str):
@@ -218,7 +218,7 @@ def _kept(name: Any, value: Any) -> Any:
         numbers = np.array(value, float)
     except (TypeError, ValueError):
         raise _core.EvaluationError(
-            f"{name!r} of a measure is {value!r:.60}; what is kept are numbers, arrays of them, truths and texts"
+            f"{name!r} of a measure is {value!r:.60}; a sweep keeps numbers, arrays of numbers, truths and texts"
         ) from None
     return float(numbers) if numbers.ndim == 0 else numbers
 
@@ -226,33 +226,33 @@ def _kept(name: Any, value: Any) -> Any:
 # ---------------------------------------------------------------------- in other threads and processes
 
 _own = threading.local()
-"""The work that a thread last did, as its own: scenes are set by samples, one at a time."""
+"""Each thread's own copy of its last work: samples modify the scene, one at a time."""
 
 
 def run_in_thread(work: Any, rows: Rows) -> list[Outcome]:
-    """`run_rows` with this thread's own copy of the work."""
+    """Do `run_rows` with this thread's own copy of the work."""
     if getattr(_own, "of", None) is not work:
         _own.of, _own.work = work, work.own()
     return run_rows(_own.work, rows)
 
 
 def packed(work: Any) -> bytes:
-    """The work as bytes for another process. EvaluationError where it holds what does not go there."""
+    """Return the work as bytes for another process. Raises EvaluationError if it holds objects that cannot be sent."""
     try:
-        from cloudpickle import dumps  # comes with Dask; takes functions of a notebook along
+        from cloudpickle import dumps  # comes with Dask; sends functions of a notebook
     except ImportError:
         dumps = pickle.dumps
     try:
         return dumps(work)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise _core.EvaluationError(
-            f"the sweep does not go to another process: {error}; define its functions in a module, "
-            'or install cloudpickle (extra [dask]), or take on="threads"'
+            f"the sweep cannot be sent to another process: {error}; define its functions in a module, "
+            'install cloudpickle (extra [dask]), or use on="threads"'
         ) from None
 
 
 def run_packed(bundle: bytes, rows: Rows) -> list[Outcome]:
-    """`run_rows` of a work that came as bytes; kept, so that the next rows find it ready."""
+    """Do `run_rows` of a work received as bytes, and cache it for the next rows."""
     key = sha256(bundle).digest()
     if getattr(_own, "of", None) != key:
         _own.work = pickle.loads(bundle)

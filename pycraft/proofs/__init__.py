@@ -1,4 +1,4 @@
-"""Proofs from the definitions: statements proved or not, derivations to be filled in, graded and repaired."""
+"""Proofs from the definitions: derivations of statements, exercises with gaps, grading, and repair of wrong formulas."""
 
 from .derivative import derivative
 from .exercise import Exercise, Judgement, exercise

@@ -1,4 +1,4 @@
-"""One attempt at a statement, under given hypotheses: normal forms of both sides, then both sides times what stands inverted in them."""
+"""One attempt at a statement under given hypotheses: normal forms of both sides, then both sides multiplied by the operands of inverses."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .scalar_rules import ScalarRules
 from .words import ONE, Polynomial, Word, add_to, combine, inverse_of, inverted, plain, split
 
 ROUNDS = 4
-"""How many inverses are cleared, one after the other."""
+"""Largest number of inverses that are cleared, one after another."""
 
 
 @dataclass
 class Outcome:
-    """Normal forms of both sides and the steps to them; `frame` holds the inverses of what both were multiplied by."""
+    """Normal forms of both sides and the steps to them; `frame` holds the inverses of the factors that multiplied both sides."""
 
     left: list[Step]
     right: list[Step]
@@ -35,11 +35,11 @@ class Outcome:
 
 
 class Attempt(LocalRules):
-    """The rules of one setting and statement, and what they make of it.
+    """The rules of one setting and statement, and their application.
 
     Attributes
     ----------
-    inverses : what is known of the inverses in the statement
+    inverses : known facts on the inverses in the statement
     """
 
     def __init__(self, problem: Problem, setting: Setting, extra: Iterable[tuple[Equation, Word]] = ()):
@@ -52,7 +52,7 @@ class Attempt(LocalRules):
                 added_by[opaque.kind](opaque)
 
     def run(self, lhs: Polynomial, rhs: Polynomial) -> Outcome:
-        """Normal forms of both sides, cleared of inverses where that closes the gap. Raises GaveUp."""
+        """Return normal forms of both sides, cleared of inverses if that closes the gap. Raises GaveUp."""
         if self.problem.scalars:
             scalars = ScalarRules(self, self.inverses)
             (p, left), (q, right) = (scalars.reduce(side) for side in (lhs, rhs))
@@ -72,7 +72,7 @@ class Attempt(LocalRules):
         return at if at.closed else first
 
     def _turned(self, p: Polynomial, like: Polynomial | None = None) -> list[Step]:
-        """Words that are numbers transposed: where the transpose stands in `like`; without it, to what comes first of the two."""
+        """Transpose words that are numbers if the transpose occurs in `like`; without `like`, choose the first of the two in order."""
         a = self.alphabet
         out: Polynomial = {}
         uses = []
@@ -87,7 +87,7 @@ class Attempt(LocalRules):
         return [Step(p, out, uses, a, "a number is its own transpose")] if uses else []
 
     def _cleared(self, at: Outcome, letter: str, on_left: bool) -> Outcome:
-        """Both sides times X, where X⁻¹ stands at an end of a word of their difference: Y = X⁻¹(XY)."""
+        """Multiply both sides by X if X⁻¹ is at an end of a word of their difference: Y = X⁻¹(XY)."""
         X, (a, b) = inverse_of(letter), at.frame
         frame = ((*a, letter), b) if on_left else (a, (letter, *b))
         pair = self.pair(letter, X) if on_left else self.pair(X, letter)
@@ -105,7 +105,7 @@ class Attempt(LocalRules):
         return Outcome(chains[0], chains[1], p, q, frame)
 
     def _opened(self, X: str, p: Polynomial) -> list[Step]:
-        """X written as its operand, where it has one."""
+        """Write X as its operand, if it has one."""
         name, mark = split(X)
         opaque = next((o for o in self.problem.opaque if o.name == name and o.kind == "inverse"), None)
         if opaque is None:
@@ -122,7 +122,7 @@ class Attempt(LocalRules):
 
 
 def _end(difference: Polynomial) -> tuple[str, bool] | None:
-    """(X⁻¹, whether it stands at the left end) of a word, where one does; D⁻¹, φ⁻¹ and ψ⁻¹ have rules of their own."""
+    """Return X⁻¹ at an end of a word, and True if it is the left end; D⁻¹, φ⁻¹ and ψ⁻¹ have their own rules."""
     for on_left in (True, False):
         for word in difference:
             letter = word[0 if on_left else -1] if word else ""
@@ -132,5 +132,5 @@ def _end(difference: Polynomial) -> tuple[str, bool] | None:
 
 
 def _in_frame(step: Step, frame: Frame) -> Step:
-    """The step with a frame around it."""
+    """Return the step with a frame around it."""
     return Step(step.before, step.after, [u.between(*frame) for u in step.uses], step.alphabet, step.title, (frame, frame))

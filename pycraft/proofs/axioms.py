@@ -1,11 +1,11 @@
-"""The axioms, and the lemmas that are proved from them: what `prove` may use, all of it on this page.
+"""The axioms, and the lemmas proved from them: everything that `prove` may use.
 
-Every lemma stands with what its own proof uses: pairs (word, equation), each of which replaces the word, wherever it stands on either side,
-by what the equation says it is. When all have had their turn, in this order, the two sides are the same: that is the proof, carried out
-when the lemma is first used. An equation may be read in either direction; "(...)*" is its transpose. What a lemma cites stands above it.
+Every lemma comes with its proof: pairs (word, equation), each of which replaces the word, wherever it occurs on either side,
+by its value from the equation. After all replacements, in this order, the two sides are equal: that is the proof, carried out
+when the lemma is first used. An equation may be read in either direction; "(...)*" is its transpose. A lemma cites only earlier lemmas.
 
-With their transposes, the equations that `normal_form` reads as rules bring words to a normal form that does not depend on where one
-begins (`tests/proofs/test_prove_axioms.py` resolves all their overlaps): two polynomials of these letters, Υ aside on chains, are equal by
+With their transposes, the equations that `normal_form` reads as rules bring words to a normal form that does not depend on where reduction
+begins (`tests/proofs/test_prove_axioms.py` resolves all their overlaps): two polynomials of these letters, except Υ on chains, are equal by
 the axioms exactly if their normal forms are.
 """
 
@@ -18,7 +18,7 @@ from . import mechanics
 from .equations import SYMMETRY, Equation, Step, Use, joined
 from .words import Alphabet, Polynomial, Word, add_to, parse, parse_equation
 
-# What the operators are. M = P - E_ψPE_φ* and M = R - E_φRE_φ* are the sweeps of P and R; φ⁻¹ and ψ⁻¹ exist since E_φ is strictly
+# Definitions of the operators. M = P - E_ψPE_φ* and M = R - E_φRE_φ* are the sweeps of P and R; φ⁻¹ and ψ⁻¹ exist since E_φ is strictly
 # triangular, D⁻¹ since the hinges are regular.
 AXIOMS = [
     "φ⁻¹ = I − E_φ",
@@ -35,7 +35,7 @@ AXIOMS = [
     "Υ = E_ψ* Υ E_ψ − S + H* D⁻¹ H",
 ]
 SYMMETRIC = ("M", "P", "R", "D", "J")
-"""M* = M, ... are axioms too."""
+"""Symmetric letters: M* = M, ... are also axioms."""
 
 # Abbreviations. In the recursion of Υ, S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ): the blocks between siblings.
 DEFINITIONS = [
@@ -44,10 +44,10 @@ DEFINITIONS = [
     "P⁺ = τ̄ P",
 ]
 
-# Under these alone.
+# Equations that hold only under a hypothesis.
 HYPOTHESES = {"J = 0": "J = 0", "S = 0": "serial chain"}
 
-# What an inverse is. Where M⁻¹, P⁻¹, R⁻¹, J⁻¹, Υ⁻¹ stand in a statement, it presupposes that they exist.
+# Definition of an inverse. A statement with M⁻¹, P⁻¹, R⁻¹, J⁻¹, Υ⁻¹ presupposes that they exist.
 INVERTIBLE = ("φ", "ψ", "X", "D", "M", "P", "R", "J", "Υ")
 INVERSES = [f"{x} {x}⁻¹ = I" for x in INVERTIBLE] + [f"{x}⁻¹ {x} = I" for x in INVERTIBLE]
 
@@ -214,7 +214,7 @@ class Theory:
         return [self(text) for text in self._lemmas]
 
     def _prove(self, text: str) -> Equation:
-        """A lemma with its proof; what it cites stands above it."""
+        """Return a lemma with its proof; it cites only earlier lemmas."""
         lhs, rhs = parse_equation(text)
         left, right = (self._reduced(side, text) for side in (lhs, rhs))
         steps = joined(left, right, lhs, rhs, self.alphabet)
@@ -227,7 +227,7 @@ class Theory:
         for word, cited in self._lemmas[lemma]:
             plain = cited[1:-2] if cited.startswith("(") else cited
             if self._order[plain] >= self._order[lemma]:
-                raise AssertionError(f"{lemma} cites {plain}, which does not stand above it")
+                raise AssertionError(f"{lemma} cites {plain}, which is not an earlier lemma")
             step = replaced_everywhere(steps[-1].after if steps else side, *solved(self(cited), tuple(word.split())), self.alphabet)
             if step is not None:
                 steps.append(step)
@@ -235,9 +235,9 @@ class Theory:
 
 
 def solved(equation: Equation, word: Word) -> tuple[Equation, Word, Polynomial, int]:
-    """The equation read as word = the rest: (equation, word, the rest, the sign with which lhs - rhs is word - the rest).
+    """Return the equation solved for a word: (equation, word, the rest, the sign with which lhs - rhs is word - the rest).
 
-    Raises ValueError where the word does not occur with coefficient ±1.
+    Raises ValueError if the word does not occur with coefficient ±1.
     """
     difference = equation.difference
     c = difference.get(word, 0)
@@ -247,7 +247,7 @@ def solved(equation: Equation, word: Word) -> tuple[Equation, Word, Polynomial, 
 
 
 def replaced_everywhere(p: Polynomial, equation: Equation, word: Word, by: Polynomial, sign: int, alphabet: Alphabet) -> Step | None:
-    """The step that replaces a word at every place, until none is left; None where there is none."""
+    """Return the step that replaces all occurrences of a word; None if it does not occur."""
     uses: list[Use] = []
     todo = deque(p.items())
     done: Polynomial = {}
@@ -266,7 +266,7 @@ def replaced_everywhere(p: Polynomial, equation: Equation, word: Word, by: Polyn
 
 
 def find(word: Word, part: Word) -> int:
-    """Where the part begins in the word, -1 if nowhere."""
+    """Return the index of the part in the word, -1 if it does not occur."""
     n = len(part)
     return next((i for i in range(len(word) - n + 1) if word[i : i + n] == part), -1)
 

@@ -1,9 +1,9 @@
-"""Diagonal blocks of words, by what is known of their letters.
+"""Diagonal blocks of words, from the shapes of their letters.
 
-A body's block row and column say where a letter leads on the tree: E_φ, E_ψ and K from a body to its children, φ and ψ to all outboard
-bodies and the body itself (with I there), their transposes back. So the diagonal blocks of a word are known without a number: all of it,
-where it leads from every body to itself alone, as ERE* does; nothing, where it never leads back, as φ̃R; the rest without φ and ψ, where
-these are all that moves.
+The block rows and columns of a letter determine where it leads on the tree: E_φ, E_ψ and K from a body to its children, φ and ψ to all
+outboard bodies and the body itself (with I there), their transposes back. This determines the diagonal blocks of a word without evaluation:
+all of the word, if it leads from every body only to itself, as ERE* does; zero, if it never leads back, as φ̃R; the word without φ and ψ, if
+only these lead to other bodies.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def moves(letter: str, alphabet: Alphabet) -> str:
 
 
 def diagonal_blocks(word: Word, alphabet: Alphabet, chain: bool = False) -> Polynomial:
-    """blockdiag(word), where the letters say what it is; else with a letter of its own for what they do not.
+    """Return blockdiag(word) if the letters determine it, else with a new letter for the undetermined part.
 
-    On a serial chain (`chain`) how far a letter leads decides: K*ψ̃*ΥK never leads back, K*ΥK always does.
+    On a serial chain (`chain`), the distance that a letter leads decides: K*ψ̃*ΥK never leads back, K*ΥK always does.
     """
     parts: list[tuple[Word, str]] = [((letter,), moves(letter, alphabet)) for letter in word]
     parts = _closed(parts)
@@ -66,7 +66,7 @@ def diagonal_blocks(word: Word, alphabet: Alphabet, chain: bool = False) -> Poly
 
 
 def _by_levels(parts: list[tuple[Word, str]]) -> Polynomial | None:
-    """Diagonal blocks on a chain, by how many bodies outward each letter leads; None where that does not say."""
+    """Return diagonal blocks on a chain from the number of bodies that each letter leads outward; None if that does not decide."""
     low, high = 0.0, 0.0
     for _, way in parts:
         down, up = _LEVELS.get(way, (-math.inf, math.inf))
@@ -106,7 +106,7 @@ def _towards_the_base(parts: list[tuple[Word, str]], alphabet: Alphabet) -> Poly
 
 
 def _edge(letter: Word, star: str) -> list[tuple[Word, Word, int]]:
-    """(H, K, ...) of the terms of E_ψ, or E_φ: what stands at its ends, what leads, and the sign."""
+    """Return (H, K, ...) of the terms of E_ψ, or E_φ: the factors at its ends, the leading factor, and the sign."""
     name = letter[0].removesuffix("*")
     mark = name.removeprefix("ψ").removeprefix("φ")
     edge: list[tuple[Word, Word, int]] = [((), (f"E_φ{mark}{star}",), 1)]
@@ -116,7 +116,7 @@ def _edge(letter: Word, star: str) -> list[tuple[Word, Word, int]]:
 
 
 def _closed(parts: list[tuple[Word, str]]) -> list[tuple[Word, str]]:
-    """A step to the children, blocks, and the step back lead from every body to itself alone."""
+    """Return True for a step to the children, blocks, and the step back: it leads from every body only to itself."""
     done: list[tuple[Word, str]] = []
     for part in parts:
         done.append(part)

@@ -1,4 +1,4 @@
-"""Proofs by cases: "J > 0 or J = 0" among what is assumed is proved where J > 0, and where J = 0."""
+"""Proofs by cases: with the assumption "J > 0 or J = 0", a statement is proved for J > 0 and for J = 0."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .shown import page
 
 
 def alternatives(assume: Iterable[str]) -> list[list[str]]:
-    """Every choice of one case of each assumption; one choice where none has several."""
+    """Return every choice of one case of each assumption; one choice if no assumption has several."""
     texts = [assume] if isinstance(assume, str) else list(assume)
     return [list(chosen) for chosen in itertools.product(*([case.strip() for case in text.split(" or ")] for text in texts))]
 
 
 def by_cases(assume: Iterable[str], prove: Callable[[list[str]], Proof]) -> Proof:
-    """The proof under what is assumed: case by case where that has cases."""
+    """Return the proof under the assumptions, case by case if they have cases."""
     texts = [assume] if isinstance(assume, str) else list(assume)
     chosen = alternatives(texts)
     if len(chosen) == 1:
@@ -49,7 +49,7 @@ class CaseProof(Proof):
         self._found = len(cases) == len(chosen) and all(cases) and all(map(self._keeps_to_its_case, range(len(cases))))
 
     def _keeps_to_its_case(self, i: int) -> bool:
-        """Whether a case was proved without a hypothesis that another one is, and takes no inverse that does not exist in it."""
+        """Return True if a case was proved without the hypothesis of another case, and uses no inverse that does not exist in it."""
         case, own = self.cases[i], self._chosen[i]
         others = {name for j, c in enumerate(self._chosen) if j != i for name in c} - {*own}
         return not others & {*case.hypotheses} and not case.void_where([name for name in HYPOTHESES if name in {*own, *case.hypotheses}])
@@ -59,7 +59,7 @@ class CaseProof(Proof):
 
     @property
     def hypotheses(self) -> list[str]:
-        """What the cases are of, that one of them holds, and what else the proofs use."""
+        """Hypotheses: that one of the cases holds, and the other hypotheses of the proofs."""
         own = {name for chosen in self._chosen for name in chosen}
         used = dict.fromkeys(h for case in self.cases for h in case.hypotheses if h not in own)
         return [*(name for name in HYPOTHESES if name in used), *(n for n in used if n not in HYPOTHESES), *self._split]
@@ -77,5 +77,5 @@ class CaseProof(Proof):
         return " \\\\ ".join(case.latex() for case in self.cases)
 
     def verify(self, model: Any = None, seed: int = 0) -> float:
-        """Each case on the model, or on an example that meets it: see `Proof.verify`."""
+        """Verify each case on the model, or on an example that meets it: see `Proof.verify`."""
         return max(case.verify(model, seed) for case in self.cases)

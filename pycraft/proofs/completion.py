@@ -1,6 +1,6 @@
 """Completion: where two rules overlap on a word, it can be rewritten in two ways; if these differ, their equality is a new rule.
 
-Only overlaps with what a statement adds are looked at: the rules of `normal_form` have none left that say anything new. Bounded, in
+Only overlaps with a statement's own rules are examined: all overlaps of the rules of `normal_form` are resolved. The search is bounded in
 rules and rewrites; each new rule is a lemma with its own proof.
 """
 
@@ -16,13 +16,13 @@ from .walk import GaveUp
 from .words import ONE, Polynomial, Word, add_to, combine, ratio, split
 
 RULES, LENGTH, REWRITES = 24, 14, 1500
-"""How many rules are added, how long their words may be, how many rewrites are spent."""
+"""Limits on added rules, length of their words, and rewrites."""
 
 
 def complete(attempt: Attempt) -> int:
-    """Adds rules by overlaps of the attempt's own ones; returns how many.
+    """Add rules from overlaps of the attempt's own rules; return their number.
 
-    None if they say something of the letters of the table alone: the axioms do not, so what the statement presupposes cannot be.
+    Returns None if a new rule holds only letters of the table: the axioms do not imply it, so the presuppositions are inconsistent.
     """
     own = {id(e) for e in attempt.equations} | {id(e.transposed(attempt.alphabet)) for e in attempt.equations}
     queue = [rule for rule in attempt.rules.all() if id(rule.equation) in own]
@@ -40,12 +40,12 @@ def complete(attempt: Attempt) -> int:
 
 
 def _on_base(lemma: Equation) -> bool:
-    """Whether an equation holds letters of the table alone."""
+    """Return True if an equation holds only letters of the table."""
     return all(split(x)[0] in theory().alphabet.letters for w in [*lemma.lhs, *lemma.rhs] for x in w)
 
 
 def _new(attempt: Attempt, rule: Rule, budget: Budget) -> Iterator[tuple[Equation, Word]]:
-    """What the overlaps of a rule with all others give."""
+    """Yield the lemmas from the overlaps of a rule with all others."""
     for other in attempt.rules.all():
         for first, second in ((rule, other), (other, rule)):
             for k in overlaps(first.word, second.word):
@@ -58,7 +58,7 @@ def _new(attempt: Attempt, rule: Rule, budget: Budget) -> Iterator[tuple[Equatio
 
 
 def _critical(attempt: Attempt, first: Rule, second: Rule, k: int, budget: Budget) -> tuple[Equation, Word] | None:
-    """The lemma of one overlap, with the word that it replaces; None if it says nothing new, or of too long a word."""
+    """Return the lemma of one overlap, with the word that it replaces; None if it is not new, or its word is too long."""
     a = attempt.alphabet
     whole = first.word + second.word[k:]
     sides = []

@@ -1,9 +1,9 @@
 """Derivatives of words along coordinates and time: the product rule, and ∂E_φ = E_φΔ_i, dE_φ/dt = E_φΔ_θ̇, dH/dt = Ḣ.
 
-To every letter X belongs a letter ∂X; the product rule carries ∂ through words, ∂(X⁻¹) = -X⁻¹∂XX⁻¹, so that every equation has a
-derivative. From those of the axioms follow ∂φ = φ∂E_φφ, ∂G = (∂PH* + P∂H* - G∂D)D⁻¹, ...; ∂P and ∂R stay, bound by the derivatives of
-their recursions. A second derivative ∂ⱼ∂X is the derivative of the equations of the first; Δ_i stays as θ_j of another hinge, or θ_i,
-moves.
+Every letter X has a letter ∂X; the product rule carries ∂ through words, ∂(X⁻¹) = -X⁻¹∂XX⁻¹, so that every equation has a
+derivative. The derivatives of the axioms give ∂φ = φ∂E_φφ, ∂G = (∂PH* + P∂H* - G∂D)D⁻¹, ...; ∂P and ∂R remain, bound by the derivatives of
+their recursions. A second derivative ∂ⱼ∂X obeys the derivative of the equations of the first; Δ_i does not change as θ_j of another hinge,
+or θ_i, moves.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .words import (
     split,
 )
 
-# As in `axioms`: what stands above, and d(...), the derivative of an equation.
+# As in `axioms`: earlier equations, and d(...), the derivative of an equation.
 LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [
     ("∂φ = φ ∂E_φ φ", [("φ ∂E_φ", "d(φ E_φ = φ − I)"), ("E_φ φ", "E_φ φ = φ − I")]),
     ("∂ψ = ψ ∂E_ψ ψ", [("ψ ∂E_ψ", "d(ψ E_ψ = ψ − I)"), ("E_ψ ψ", "E_ψ ψ = ψ − I")]),
@@ -46,7 +46,7 @@ LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [
     ("E_φ ∂R E_φ* = ∂R − ∂M − ∂E_φ R E_φ* − E_φ R ∂E_φ*", [("∂M", "d(M = R − E_φ R E_φ*)")]),
 ]  # fmt: skip
 
-# (the word that goes, the equation), by rank.
+# (the replaced word, the equation), by rank.
 _RULES = [
     ("∂φ", "∂φ = φ ∂E_φ φ"),
     ("∂ψ", "∂ψ = ψ ∂E_ψ ψ"),
@@ -67,7 +67,7 @@ _RULES = [
 
 
 def differentiated(p: Polynomial, mark: str = FIRST) -> Polynomial:
-    """The product rule, with ∂(X⁻¹) = -X⁻¹∂XX⁻¹; the letters of derivatives bear this mark."""
+    """Return the derivative by the product rule, with ∂(X⁻¹) = -X⁻¹∂XX⁻¹; letters of derivatives get this mark."""
     total: Polynomial = {}
     for word, c in p.items():
         for i, letter in enumerate(word):
@@ -97,7 +97,7 @@ class Derivatives:
         self._equations: dict[str, Equation] = {}
 
     def add_letter(self, known: Letter) -> None:
-        """∂X of a letter X that is no second derivative."""
+        """Add ∂X of a letter X that is not a second derivative."""
         if len(derivations(known.name)[0]) < 2:
             subscript = "" if self.mark == FIRST else "_j" if self._shown == SECOND else "_t"
             name, partial = f"{self.mark}{known.name}", f"\\partial{subscript}"
@@ -105,7 +105,7 @@ class Derivatives:
             self.alphabet.add(Letter(name, f"{self._shown}{known.text}", f"{partial} {{{known.latex}}}", known.symmetric, shape))
 
     def __call__(self, text: str) -> Equation:
-        """The equation of this text: of derivatives, d(...), or of `axioms`."""
+        """Return the equation of this text: from the derivatives, d(...), or from `axioms`."""
         if FIRST not in text and not text.startswith("d("):
             return theory()(text)
         if text not in self._equations:
@@ -134,11 +134,11 @@ class Derivatives:
 
 
 RuleOf = tuple[Equation, Word]
-"""An equation, and the word that goes by it."""
+"""An equation, and the word that it replaces."""
 
 
 class DerivativeProblem(Problem):
-    """A problem whose statement may hold derivatives along one or two coordinates, or along one and time, first and second ones."""
+    """A problem with first and second derivatives along one or two coordinates, or along one coordinate and time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -153,7 +153,7 @@ class DerivativeProblem(Problem):
             self._derivatives[mark].add_letter(known)
         p = differentiated(p, mark)
         if any(len(derivations(split(x)[0])[0]) > 2 for word in p for x in word):
-            raise _core.EvaluationError("derivatives beyond the second are not proved")
+            raise _core.EvaluationError("prove supports first and second derivatives, not higher ones")
         return self.alphabet.star_of(p) if transposed else p
 
     def _mark_along(self, index: Any) -> str:
@@ -162,14 +162,14 @@ class DerivativeProblem(Problem):
         mark = next((m for m, known in along.items() if known == index), None)
         if mark is None:
             if len(along) == 2:
-                raise _core.EvaluationError("a statement holds derivatives along two coordinates at most, or along one and time")
+                raise _core.EvaluationError("a statement may hold derivatives along at most two coordinates, or along one and time")
             mark = SECOND if along else FIRST
             along[mark] = index
             self._derivatives[mark] = Derivatives(self.alphabet, mark, "∂_t " if index == TIME and mark == SECOND else mark)
         return mark
 
     def derivative_rules(self) -> tuple[list[RuleOf], list[RuleOf]]:
-        """(rules, rules under "constant H") for derivatives of letters: (equation, the word that goes). None where nothing is derived."""
+        """Return (rules, rules under "constant H") for derivatives of letters: (equation, replaced word). None without derivatives."""
         rules: list[RuleOf] = []
         constant: list[RuleOf] = []
         deltas = {mark: self._delta(mark) for mark in self._derivatives}
@@ -190,7 +190,7 @@ class DerivativeProblem(Problem):
         return rules[::-1], constant
 
     def single_axis_rules(self) -> list[RuleOf]:
-        """Under "single-DOF hinges": Δ_θ̇Δ_i = Δ_iΔ_θ̇, at each body crosses of one axis; with stars as without."""
+        """Under "single-DOF hinges": Δ_θ̇Δ_i = Δ_iΔ_θ̇, because at each body both are crosses of one axis; also with stars."""
         along = self.alphabet.along
         if len(along) < 2 or TIME not in along.values():
             return []
@@ -200,7 +200,7 @@ class DerivativeProblem(Problem):
         return [(Equation("hypothesis", text, {(T, D): ONE}, {(D, T): ONE}, hypothesis="single-DOF hinges"), (T, D))]
 
     def recursion_rules(self) -> list[RuleOf]:
-        """Of ∂Υ, where diagonal blocks are taken: E_φ*∂ΥE_φ by ∂Υ and ∂S, which has no blocks on the diagonal."""
+        """Return rules for ∂Υ under blockdiag: E_φ*∂ΥE_φ by ∂Υ and ∂S, which has no blocks on the diagonal."""
         text, word = next((text, word) for word, text in COMPLIANCE if word == "E_φ* Υ E_φ")
         rules = []
         for mark in self._derivatives:
@@ -239,7 +239,7 @@ class DerivativeProblem(Problem):
         return sorted({(marks[0], marks[1]) for x in letters if len(marks := derivations(x)[0]) == 2})
 
     def _derived(self, rule: RuleOf, inner: str, outer: str) -> RuleOf:
-        """The derivative of a rule for first derivatives, for the second one in its word."""
+        """Return the derivative of a rule for first derivatives, as a rule for the second derivative in its word."""
         equation, word = rule
         return derivative_of(equation, outer), tuple(f"{outer}{x}" if derivations(split(x)[0])[0] == [inner] else x for x in word)
 
@@ -253,7 +253,7 @@ class DerivativeProblem(Problem):
         return [(Equation("axiom", text, {(name,): ONE}, {}), (name,))]
 
     def _deltas_with_constant_axes(self, delta: str, outer: str) -> list[RuleOf]:
-        """∂_tΔ_i = 0 and ∂_iΔ_θ̇ = 0 where the axes are constant in their bodies; ∂_iḢ = 0 follows from Ḣ = 0."""
+        """∂_tΔ_i = 0 and ∂_iΔ_θ̇ = 0 if the axes are constant in their bodies; ∂_iḢ = 0 follows from Ḣ = 0."""
         found: list[RuleOf] = []
         for name in (f"{outer}{delta}", f"{outer}Ḣ"):
             known = self.alphabet.letters.get(name)
@@ -262,7 +262,7 @@ class DerivativeProblem(Problem):
         return found
 
     def _deltas_of_two_bodies(self, deltas: list[str]) -> list[RuleOf]:
-        """Δ_iΔ_j = 0, each a block of one body, where these are two; with stars as without."""
+        """Δ_iΔ_j = 0 if each is a block of another body; also with stars."""
         along = self.alphabet.along.values()
         if len(deltas) < 2 or TIME in along or len({self._body_of(index) for index in along}) < 2:
             return []

@@ -1,4 +1,4 @@
-"""∂X/∂θ_i as something to be proved equal to an expression: `derivative(X, i)`, and sums and products of such with operators."""
+"""∂X/∂θ_i as a side of a statement to prove: `derivative(X, i)`, and sums and products of derivatives with operators."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from .. import _core
 from ..identities.vocabulary import Written, is_number
 
 TIME = "t"
-"""The direction of a derivative along time, where coordinates are numbers."""
+"""The direction of a derivative along time; coordinates are numbers."""
 
 
 class Formula(Written):
-    """A derivative, or what is made of derivatives and operators: goes wherever `prove` takes an expression.
+    """A derivative, or an expression of derivatives and operators, for use wherever `prove` takes an expression.
 
-    Sums, differences, products (`@`), multiples by numbers and `.T`, with operators on either side. It has no value of its own: `X.diff(i)`
-    has one.
+    It supports sums, differences, products (`@`), multiples by numbers and `.T`, with operators on either side. It has no value: use
+    `X.diff(i)` to evaluate a derivative.
     """
 
     __array_ufunc__ = None
@@ -72,16 +72,16 @@ class Formula(Written):
         return Formula("transpose", [self])
 
     def blockdiag(self) -> Formula:
-        """Its diagonal blocks."""
+        """Return its diagonal blocks."""
         return Formula("blockdiag", [self])
 
     @property
     def is_symmetric(self) -> bool:
-        """Nothing is known of it."""
+        """False: symmetry is unknown."""
         return False
 
     def written_out(self) -> Any:
-        """The expression that it is, its derivatives by `diff`."""
+        """Return the expression, with derivatives computed by `diff`."""
         parts = [c.written_out() if isinstance(c, Formula) else c for c in self.children]
         match self.kind:
             case "derivative":
@@ -101,7 +101,7 @@ class Formula(Written):
 
     @property
     def domain(self) -> Any:
-        """The space it acts on; None for an I that has none."""
+        """The space on which it acts; None for an I without a space."""
         if self.kind == "transpose":
             space = self.children[0].codomain
             return None if space is None else space.dual
@@ -118,7 +118,7 @@ class Formula(Written):
 
     @property
     def sources(self) -> list[Any]:
-        """The models whose letters occur."""
+        """Models of the letters."""
         return [s for c in self.children for s in c.sources]
 
     # ------------------------------------------------------------------ how it is shown
@@ -158,12 +158,12 @@ def _number(c: Any) -> str:
 
 
 def derivative(expression: Any, coordinate: int | str) -> Formula:
-    """∂(expression)/∂θ_i, or d(expression)/dt, to be proved equal to something by `prove`.
+    """Return ∂(expression)/∂θ_i, or d(expression)/dt, as a side of a statement for `prove`.
 
     Parameters
     ----------
-    expression : an operator expression, or such a derivative: a second one
-    coordinate : the coordinate i, by number or by name; "t" for time, along which θ̇ moves by the vector `vdot`
+    expression : an operator expression, or a first derivative, which gives a second one
+    coordinate : the coordinate i, by number or by name; "t" for time, with dθ̇/dt the vector `vdot`
 
     Returns
     -------
@@ -172,7 +172,7 @@ def derivative(expression: Any, coordinate: int | str) -> Formula:
     Raises
     ------
     ModelError
-        There is no such coordinate.
+        The coordinate does not exist.
 
     Examples
     --------
@@ -190,5 +190,5 @@ def derivative(expression: Any, coordinate: int | str) -> Formula:
             raise _core.ModelError(f"no coordinate is called {coordinate!r}; there are {', '.join(names[:12])}")
         coordinate = names.index(coordinate)
     if not 0 <= coordinate < len(names):
-        raise _core.ModelError(f"coordinate {coordinate} of a model that has {len(names)}")
+        raise _core.ModelError(f"there is no coordinate {coordinate}: the model has {len(names)}, numbered from 0")
     return Formula("derivative", [expression], index=int(coordinate))

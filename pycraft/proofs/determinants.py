@@ -1,4 +1,4 @@
-"""Determinants: ln|det| of what is triangular, of products of square factors, of the mass matrix, of partitioned operators.
+"""Determinants: ln|det| of triangular operators, of products of square factors, of the mass matrix, of partitioned operators.
 
 ln|det XY| = ln|det X| + ln|det Y| for square factors,    ln|det X*| = ln|det X|,    ln|det c I + strictly triangular| = n ln|c|,
 ln|det(ℳ + J)| = ln det D,  by ℳ + J = [I+HφK] D [I+HφK]*.
@@ -20,20 +20,20 @@ from .scalar_steps import fact
 from .scalar_words import space_of, trace_word
 from .words import ONE, Alphabet, Number, Polynomial, Word, add_to, combine, inverse_of, inverted, monomial, of_model, plain, split, times
 
-TRIANGULAR = "the determinant of a triangular operator is that of its diagonal"
+TRIANGULAR = "the determinant of a triangular operator is the determinant of its diagonal"
 PRODUCT = "the determinant of a product of square factors"
 PARTITIONED = "the determinant of a partitioned operator: of one block, and of the other's Schur complement"
 """The reasons, as notes of equations."""
 
 
 class Determinants:
-    """What is known of the determinants in a statement."""
+    """Known facts on the determinants in a statement."""
 
     def __init__(self, local: LocalRules, inverses: Inverses):
         self.local, self.inverses, self.problem, self.alphabet = local, inverses, local.problem, local.alphabet
 
     def equations(self, word: Word) -> Iterator[Equation]:
-        """What is known of ln|det X|, by X as it was written and by its normal form."""
+        """Yield known equations for ln|det X|, from X as written and from its normal form."""
         name = word[1]
         opaque = next((o for o in self.problem.opaque if o.name == name), None)
         inner: Polynomial = {(name,): ONE} if opaque is None else opaque.inner
@@ -47,14 +47,14 @@ class Determinants:
         yield from self._factor(word)
 
     def _triangular(self, word: Word, inner: Polynomial, form: Polynomial, steps: Sequence[Step]) -> Iterator[Equation]:
-        """n ln|c| of what comes to c I and a strictly triangular part."""
+        """n ln|c| if X reduces to c I and a strictly triangular part."""
         if is_triangular(form, self.alphabet):
             c = sum(c for w, c in form.items() if is_triangular({w: ONE}, self.alphabet))
             check = functools.partial(_is_triangular, inner, form, steps, self.alphabet)
             yield fact(self.alphabet, word, self._multiple(word, c), TRIANGULAR, check, steps)
 
     def _product(self, word: Word, inner: Polynomial, form: Polynomial, steps: Sequence[Step]) -> Iterator[Equation]:
-        """The sum over the letters of what comes to one word of square letters."""
+        """The sum over the letters if X reduces to one word of square letters."""
         if len(form) != 1:
             return
         ((letters, c),) = form.items()
@@ -65,7 +65,7 @@ class Determinants:
             yield fact(self.alphabet, word, by, PRODUCT, functools.partial(chain_holds, steps, inner, form), steps)
 
     def _by_factors(self, word: Word, form: Polynomial, definition: Equation) -> Iterator[Equation]:
-        """ln|det X| of X = c A D A*, which ℳ + J is: by those of A and D."""
+        """ln|det X| of X = c A D A*, such as ℳ + J, from the determinants of A and D."""
         found = self.inverses.factored(word[1], form, definition)
         if found is not None:
             product, factor, mark, c = found
@@ -73,19 +73,19 @@ class Determinants:
             yield fact(self.alphabet, word, by | self._multiple(word, c), PRODUCT, product.holds, uses=[product])
 
     def _factor(self, word: Word) -> Iterator[Equation]:
-        """0 of an innovations factor I + HφK."""
+        """Zero for an innovations factor I + HφK."""
         for factor in self.inverses.found_factors:
             if factor.name == word[1]:
                 check = functools.partial(is_triangular, factor.definition.rhs, self.alphabet)
                 yield fact(self.alphabet, word, {}, TRIANGULAR, check, uses=[factor.definition])
 
     def _multiple(self, word: Word, c: Number) -> Polynomial:
-        """ln|det c I| on the space of the operator that this word is of; nothing where |c| is 1."""
+        """ln|det c I| on the space of the word's operator; nothing if |c| is 1."""
         size = c if c > 0 else -c
         return {} if size == 1 else {("ln", str(size), trace_word((), self.alphabet, space_of((word[1],), self.alphabet))[1]): ONE}
 
     def _partitioned(self, word: Word, inner: Polynomial) -> Iterator[Equation]:
-        """ln|det H X H*| by two sets of hinges that are all of them together: that of one set's block and of its Schur complement."""
+        """ln|det H X H*| from a partition of the hinges into two sets: the determinants of one set's block and of its Schur complement."""
         for first, second, base in self._halves():
             H, H_star = of_model("H", base), of_model("H*", base)
             if not inner or any(len(w) < 2 or w[0] != H or w[-1] != H_star for w in inner):
@@ -108,11 +108,11 @@ class Determinants:
                         yield fact(self.alphabet, word, by, PARTITIONED, functools.partial(self._equal, parts), uses=[*uses, *premises])
 
     def _equal(self, pairs: Sequence[tuple[Polynomial, Opaque]]) -> bool:
-        """Whether operands have the normal forms of these words."""
+        """Return True if operands have the normal forms of these words."""
         return all(self.local.reduce(p)[0] == self.local.reduce(o.inner)[0] for p, o in pairs)
 
     def _halves(self) -> Iterator[tuple[str, str, str]]:
-        """(mark, mark, the mark of their model) of two trees with hinges locked, each hinge in one of them."""
+        """Return (mark, mark, the mark of their model) of two trees with hinges locked, if each hinge is in one of them."""
         names = {mark: source.coordinate_names for mark, (source, _) in zip(self.problem.marks, self.problem.contexts, strict=False)}
         for first, base in self.local.locked:
             for second, other in self.local.locked:

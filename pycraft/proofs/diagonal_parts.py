@@ -1,4 +1,4 @@
-"""Diagonal parts of operators, blockdiag(X), and lower halves of symmetric ones: what they are by the words inside them."""
+"""Diagonal parts of operators, blockdiag(X), and lower halves of symmetric operators, from the words inside them."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from .words import ONE, Letter, Polynomial, Word, combine, monomial, ratio, spli
 
 
 class DiagonalParts:
-    """What is known of the diagonal parts and lower halves in a statement, added to its rules one after the other."""
+    """Known facts on the diagonal parts and lower halves in a statement, added to its rules one after another."""
 
     def __init__(self, local: LocalRules):
         self.local, self.problem, self.alphabet = local, local.problem, local.alphabet
         self._swept: list[tuple[str, str, Polynomial, list[Step]]] = []
 
     def add(self, o: Opaque) -> None:
-        """blockdiag(X), by the normal form of X."""
+        """Add blockdiag(X), by the normal form of X."""
         assert self.local.block_rules is not None
         a = self.alphabet
         form, steps = self.local.block_rules.reduce(o.inner, a)
@@ -36,7 +36,7 @@ class DiagonalParts:
         self.local.add(equation, (name,))
 
     def _written(self, o: Opaque, form: Polynomial, steps: list[Step]) -> str:
-        """The letter of blockdiag(the normal form), with the rule that blockdiag(X) is that."""
+        """Return the letter of blockdiag(the normal form), with the rule that blockdiag(X) equals it."""
         a, known = self.alphabet, self.alphabet.letters[o.name]
         name = f"{o.name}form"
         latex = f"\\operatorname{{blockdiag}}({a.latex(form)})"
@@ -48,7 +48,7 @@ class DiagonalParts:
         return name
 
     def _recursion(self, o: Opaque) -> bool:
-        """Y = X + E Y E* for Y = blockdiag(A X A*), A = (I-E)⁻¹ and X block diagonal; Y = Z where Z obeys the same. Whether Y is that."""
+        """Add Y = X + E Y E* for Y = blockdiag(A X A*), A = (I-E)⁻¹, X block diagonal, and Y = Z if Z obeys it. False for another Y."""
         a, problem = self.alphabet, self.problem
         factors = o.expression.children[0].children if o.expression.children[0].kind == "product" else []
         if len(factors) < 3 or factors[0].name not in ("phi", "psi") or factors[0].T != factors[-1]:

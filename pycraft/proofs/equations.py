@@ -1,10 +1,10 @@
-"""Equations, and the steps that use them: the small part that decides what counts as proved.
+"""Equations, and the steps that use them: the small trusted part that decides what is proved.
 
-A step says before = after and names the instances of equations that make it so,
+A step states before = after and names the instances of equations that imply it,
 
     before - after = Σ c · u (lhs - rhs) v        (c a number, u and v words),
 
-an identity of polynomials that `Step.holds` multiplies out and compares, with exact coefficients. How a step was found plays no part in it.
+an identity of polynomials that `Step.holds` multiplies out and compares, with exact coefficients. How the step was found does not matter.
 An equation holds because it is an axiom, a hypothesis, the meaning of an inverse, the transpose or the derivative of one that holds, or
 because a chain of such steps leads from its left side to its right side.
 """
@@ -25,16 +25,16 @@ NO_FRAME: Frame = ((), ())
 
 @dataclass(eq=False)
 class Equation:
-    """lhs = rhs, and why.
+    """lhs = rhs, with its justification.
 
     Attributes
     ----------
     kind : "axiom"; "definition" of an abbreviation or of a part of the statement; "hypothesis"; "inverse", X X⁻¹ = I; "lemma"; "transpose",
         "derivative" and "copy" (the same for another model) of `source`; "structure", on diagonal blocks and the like, shown by `check`
-    text : how it is cited
-    hypothesis : its name, where it is one
-    steps : of a lemma, from lhs to rhs; of a structure, what it needs
-    uses : what it rests on besides
+    text : text by which it is cited
+    hypothesis : name of the hypothesis, if it is one
+    steps : for a lemma, from lhs to rhs; for a structure, the steps that it needs
+    uses : other equations on which it rests
     note : a remark for the reader
     """
 
@@ -67,7 +67,7 @@ class Equation:
         return self._star
 
     def copied(self, mark: str, base: str | None = None) -> Equation:
-        """The same equation with the letters of another model; of a tree with hinges locked, those that it shares are its model's."""
+        """Return the same equation with the letters of another model; a tree with locked hinges keeps the letters shared with its model."""
         base = mark if base is None else base
         if not mark and not base:
             return self
@@ -80,11 +80,11 @@ class Equation:
 
     @property
     def root(self) -> Equation:
-        """What this is the transpose or copy of, or itself."""
+        """The equation of which this is the transpose or copy, or itself."""
         return self.source.root if self.kind in ("transpose", "copy") and self.source is not None else self
 
     def premises(self) -> Iterator[Equation]:
-        """What it rests on directly."""
+        """Return the equations on which it rests directly."""
         if self.source is not None:
             yield self.source
         yield from self.uses
@@ -92,7 +92,7 @@ class Equation:
             yield from step.premises()
 
     def holds(self) -> bool:
-        """Whether its premises give it. They are not looked into: `Proof.recheck` goes through all of them."""
+        """Return True if its premises imply it. It does not check the premises; `Proof.recheck` checks all of them."""
         if self.kind == "lemma":
             return chain_holds(self.steps, self.lhs, self.rhs)
         if self.kind == "inverse":
@@ -103,7 +103,7 @@ class Equation:
         return self.check is not None and self.check()
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a structure is shown by are the rules that found it, of one process: what they say is pickled in their place."""
+        """Pickle the result of a structure's check instead of the rules that found it, which belong to one process."""
         state = dict(vars(self))
         if isinstance(self.check, FunctionType):
             state["check"] = partial(bool, self.check())
@@ -126,7 +126,7 @@ def _transposes(lhs: Polynomial, rhs: Polynomial, of: Equation, alphabet: Alphab
 
 
 SYMMETRY: dict[str, Equation] = {}
-"""X* = X, by letter: what a transposition of symmetric letters uses. Both sides are the same word, as X* is written X."""
+"""X* = X by letter, used to transpose symmetric letters. Both sides are the same word, because X* is written X."""
 
 
 def symmetries(alphabet: Alphabet, words: Iterable[Word]) -> list[Equation]:
@@ -135,7 +135,7 @@ def symmetries(alphabet: Alphabet, words: Iterable[Word]) -> list[Equation]:
 
 
 def marked(word: Word, mark: str, base: str) -> Word:
-    """A word of the first model for another; letters that do not depend on which hinges move are those of `base`."""
+    """Return a word of the first model for another; letters that do not depend on the moving hinges are the letters of `base`."""
     return tuple(of_model(x, base if split(x)[0] in SHARED else mark) for x in word)
 
 
@@ -151,7 +151,7 @@ class Use:
     forward: bool = True
 
     def between(self, left: Word, right: Word, c: Number = ONE) -> Use:
-        """The same, times c, between two words."""
+        """Return the same use, times c, between two words."""
         return Use(c * self.coefficient, left + self.left, self.equation, self.right + right, self.word, self.forward)
 
 
@@ -163,10 +163,10 @@ class Step:
     ----------
     number : its place in the proof, from 1
     before, after : polynomials; `before_text()`, `after_latex()`, ... show them
-    uses : the instances, written with the frames multiplied out; none where only terms are collected
-    title : said of the step instead of the equations used
+    uses : the instances, with the frames multiplied out; empty if terms are only collected
+    title : shown instead of the equations used
     frames : words to the left and right of the whole, before and after: shown as factors
-    residual : |before - after| relative to the largest term, at a random state of a model; None where it was not evaluated
+    residual : |before - after| relative to the largest term, at a random state of a model; None if not evaluated
     """
 
     before: Polynomial
@@ -179,12 +179,12 @@ class Step:
     residual: float | None = None
 
     def full(self) -> tuple[Polynomial, Polynomial]:
-        """Both sides with the frames multiplied out."""
+        """Return both sides with the frames multiplied out."""
         (a, b), (c, d) = self.frames
         return framed(a, self.before, b), framed(c, self.after, d)
 
     def holds(self) -> bool:
-        """Whether the instances of equations add up to before - after, exactly."""
+        """Return True if the instances of equations add up to before - after exactly."""
         before, after = self.full()
         left = combine((1, before), (-1, after))
         for use in self.uses:
@@ -198,30 +198,30 @@ class Step:
 
     @property
     def equations(self) -> list[Equation]:
-        """The equations used, each once; transposes and copies stand under what they are made from."""
+        """The equations used, each once; transposes and copies are listed as their originals."""
         return list(dict.fromkeys(e.root for e in self.premises()))
 
     @property
     def kind(self) -> str:
-        """What the step uses: "axiom", "lemma", "hypothesis", "definition", "inverse", ... or "arithmetic"."""
+        """Kind of equations used: "axiom", "lemma", "hypothesis", "definition", "inverse", ... or "arithmetic"."""
         return ", ".join(dict.fromkeys(e.kind for e in self.equations)) or "arithmetic"
 
     @property
     def reason(self) -> str:
-        """The axioms or lemmas used, as text, and at how many places."""
+        """The axioms or lemmas used, as text, and the number of places."""
         if self.title or not self.uses:
             return self.title or "collect terms"
         return "; ".join(e.text for e in self.equations) + self.manner
 
     @property
     def manner(self) -> str:
-        """How the equations are used: transposed, and at how many places."""
+        """Manner of use: transposed, and the number of places."""
         transposed = bool(self.uses) and all(use.equation.kind == "transpose" for use in self.uses)
         return (" (transposed)" if transposed else "") + (f", at {len(self.uses)} places" if len(self.uses) > 1 else "")
 
     @property
     def positions(self) -> list[tuple[str, int, str]]:
-        """Where: (the word, how many of its letters stand before the place, what is replaced there)."""
+        """Places of use: (the word, the number of letters before the place, the replaced part)."""
         text = self.alphabet.word_text
         return [(text(u.left + u.word + u.right), len(u.left), text(u.word)) for u in self.uses]
 
@@ -268,7 +268,7 @@ def numbered(steps: list[Step]) -> list[Step]:
 
 
 def chain_holds(steps: Sequence[Step], lhs: Polynomial, rhs: Polynomial) -> bool:
-    """Whether the steps hold, fit together and lead from lhs to rhs."""
+    """Return True if the steps hold, fit together and lead from lhs to rhs."""
     at = lhs
     for step in steps:
         before, after = step.full()
@@ -279,7 +279,7 @@ def chain_holds(steps: Sequence[Step], lhs: Polynomial, rhs: Polynomial) -> bool
 
 
 def joined(left: Sequence[Step], right: Sequence[Step], lhs: Polynomial, rhs: Polynomial, alphabet: Alphabet) -> list[Step] | None:
-    """One chain from lhs to rhs of two that lead from them to the same; None if they do not."""
+    """Return a chain from lhs to rhs, made from two chains that end in the same polynomial; None if they do not."""
     a, b = left[-1].after if left else lhs, right[-1].after if right else rhs
     if a != b:
         return None
@@ -290,9 +290,9 @@ def joined(left: Sequence[Step], right: Sequence[Step], lhs: Polynomial, rhs: Po
 
 
 def opened(step: Step, equation: Equation | None = None) -> list[Step]:
-    """The step with the lemma that it uses carried out: that lemma's steps at its place. Itself where there is nothing to open.
+    """Return the step with its lemma expanded: the lemma's steps at its place. Returns the step itself if it has nothing to expand.
 
-    With `equation`, the uses of that one are opened, wherever they stand; else a step with a single use is.
+    With `equation`, all uses of that equation are expanded; otherwise a step with a single use is.
     """
     chosen = [u for u in step.uses if (equation is None or u.equation.root is equation) and u.equation.steps and u.equation.kind == "lemma"]
     chosen += [u for u in step.uses if equation is not None and u.equation.root is equation and u not in chosen and _turned(u) is not None]
@@ -316,7 +316,7 @@ def opened(step: Step, equation: Equation | None = None) -> list[Step]:
 
 
 def _turned(use: Use) -> list[Step] | None:
-    """The steps of a transposed lemma: those of the lemma, transposed. None where it has none."""
+    """Return the steps of a transposed lemma: the transposed steps of the lemma. None if it has none."""
     e = use.equation
     if e.kind != "transpose" or e.source is None or e.source.kind != "lemma" or not e.source.steps:
         return None
@@ -334,7 +334,7 @@ def _turned(use: Use) -> list[Step] | None:
 
 # ---------------------------------------------------------------------- what a proof rests on
 def foundations(equations: Iterable[Equation]) -> list[Equation]:
-    """Everything that these rest on, themselves included, premises first.
+    """Return all equations on which these rest, including themselves, premises first.
 
     Raises
     ------

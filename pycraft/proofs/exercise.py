@@ -1,7 +1,7 @@
-"""Exercises: a derivation with one line left out, and a judge of what is filled in, who accepts proofs and nothing else.
+"""Exercises: a derivation with a line left out, and a judge of answers that accepts only proofs.
 
-An answer is accepted if it is proved equal to the line before, from the axioms and under no other hypotheses than the theorem's. Numbers
-only ever refute: they say by how much a false line is off, and that a hypothesis which would save it is not idle.
+An answer is accepted if it is proved equal to the line before, from the axioms and under no hypotheses except the theorem's. Numerical
+values can only refute: they give the error of a false line, and show that a hypothesis under which it would hold is necessary.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ __all__ = ["Exercise", "Judgement", "exercise"]
 
 
 def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None = None, seed: int = 0) -> Exercise:
-    """A proof with one line left out, or several, to be filled in.
+    """Return an exercise: a proof with one or several lines left out.
 
     Parameters
     ----------
     theorem : a name of the catalogue (`soa.theorems()`), a statement as text, or a pair (lhs, rhs) of expressions
-    model : Multibody or OperatorSet on which text is read and numbers are taken; a small random tree if left out
-    blank : the number of the line to leave out, from 1, or several; without it, one is drawn
-    seed : of that draw
+    model : Multibody or OperatorSet on which text is read and evaluated; default: a small random tree
+    blank : the number of the line to leave out, from 1, or several numbers; default: a random line
+    seed : seed of the random choice
 
     Returns
     -------
     Exercise
-        It prints the derivation with the gaps; `.answer(line)`, `.hint(level)`, `.solution()`; of several gaps `.answer({2: ..., 4: ...})`
-        judges each, and `.gap(4)` is the exercise at one of them.
+        Prints the derivation with the gaps; has `.answer(line)`, `.hint(level)`, `.solution()`. With several gaps, `.answer({2: ...,
+        4: ...})` judges each, and `.gap(4)` is the exercise at one of them.
 
     Raises
     ------
     EvaluationError
-        There is no proof of it, no such theorem, no such line.
+        The theorem has no proof, or the theorem or the line does not exist.
     ParseError
-        Text that is no statement.
+        The text is not a statement.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def exercise(theorem: Any, model: Any = None, blank: int | Sequence[int] | None 
         read, name = Statement(lhs, rhs, "", "expressions"), ""
     proof = prove(read.lhs, read.rhs, model)
     if not isinstance(read.lhs, _core.Operator):
-        raise _core.EvaluationError(f"there is no proof to leave a line out of: {name or proof.statement} is said of numbers")
+        raise _core.EvaluationError(f"there is no proof to leave a line out of: {name or proof.statement} is a statement between scalars")
     if not proof:
         said = f"{name}: {proof.statement}" if name else proof.statement
         raise _core.EvaluationError(f"there is no proof to leave a line out of: {said}\n  {str(proof).partition(chr(10))[2].strip()}")
@@ -80,7 +80,7 @@ def _read_theorem(text: str, model: Any) -> tuple[Any, str]:
     theorems = {t.name: t for t in operators.theorems()}
     found = theorems.get(text) or next((t for t in theorems.values() if t.name.lower() == text.lower()), None)
     if found is not None:
-        reason = "waits for what is not there yet" if found.waiting else "it is said of blocks on one path" if found.on_one_path else ""
+        reason = "it needs features that do not exist yet" if found.waiting else "it states blocks on one path" if found.on_one_path else ""
         reason = reason or ("it is a bound" if found.at_most else "")
         if reason:
             raise _core.EvaluationError(f"there is no proof of {found.name!r} to leave a line out of: {reason}")
@@ -88,5 +88,5 @@ def _read_theorem(text: str, model: Any) -> tuple[Any, str]:
     if "=" not in text:
         near = difflib.get_close_matches(text, theorems, 3, 0.4)
         hint = f"; near it: {', '.join(map(repr, near))}" if near else "; soa.theorems() lists them"
-        raise _core.EvaluationError(f"no theorem is called {text!r}, and it is no statement lhs == rhs{hint}")
+        raise _core.EvaluationError(f"no theorem is called {text!r}, and it is not a statement lhs == rhs{hint}")
     return Statements(operators).read(text), ""

@@ -1,4 +1,4 @@
-"""Steps of exercises: what one step of a derivation may use, and whether one equation alone leads from line to line."""
+"""Steps of exercises: the equations that one step of a derivation may use, and steps from line to line by a single equation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .words import Alphabet, Polynomial, Word, of_model, plain, split
 
 
 def candidates(problem: DerivativeProblem, allowed: frozenset[str], steps: Sequence[Step]) -> Iterator[tuple[Equation, Word]]:
-    """(equation, word) of what one step may use: this derivation's equations, axioms, lemmas, and what those say under the hypotheses."""
+    """Return (equation, word) that one step may use: the derivation's equations, axioms, lemmas, and corollaries by the hypotheses."""
     facts = theory()
     known = [e.root for s in steps for e in s.premises()]
     known += [facts(text) for text in (*AXIOMS, *DEFINITIONS, *INVERSES)] + facts.lemmas
@@ -30,7 +30,7 @@ def candidates(problem: DerivativeProblem, allowed: frozenset[str], steps: Seque
 
 
 def single_equation(p: Polynomial, q: Polynomial, candidates: Sequence[tuple[Equation, Word]], alphabet: Alphabet) -> str | None:
-    """An equation that alone, with its transpose, makes p and q the same; None if there is none."""
+    """Return a single equation that, with its transpose, makes p and q equal; None if there is none."""
     words = {x for w in (*p, *q) for x in w}
     if p == q:
         return "collecting terms"
@@ -43,13 +43,13 @@ def single_equation(p: Polynomial, q: Polynomial, candidates: Sequence[tuple[Equ
             try:
                 if _replaced(p, e, w, star, alphabet) == _replaced(q, e, w, star, alphabet):
                     return equation.text
-            except (AssertionError, ValueError):  # it leads in a circle
+            except (AssertionError, ValueError):  # the replacement does not end
                 continue
     return None
 
 
 def _mark(letter: str) -> str:
-    """The mark of the further model that a letter belongs to."""
+    """Return the mark of a letter's model, if it is not the first."""
     name = split(letter)[0]
     return name[len(plain(letter)) :]
 
@@ -67,7 +67,7 @@ def _replaced(p: Polynomial, equation: Equation, word: Word, star: Word, alphabe
 
 
 def used(proof: Proof, hypothesis: str) -> dict[str, str]:
-    """Equations of a proof that hold under this hypothesis alone, each with what holds without it."""
+    """Return equations of a proof that hold only under this hypothesis, each with its general form."""
     found: dict[str, str] = {}
     for e in (e for step in proof.steps for e in step.equations):
         general = next((x for s in e.steps[:1] for x in s.equations), None)

@@ -1,8 +1,8 @@
 """Expressions written out as sums of words: products distributed, transposes and inverses carried to the letters.
 
 (AB)* = B*A*, (AB)⁻¹ = B⁻¹A⁻¹ for factors that are square by meaning, (A⁻¹)* = (A*)⁻¹, coefficients as exact fractions of what
-was typed. What is no product of letters (the inverse of a sum, a diagonal part, a square root) becomes a letter of its own that remembers
-what stands inside it.
+was typed. Other expressions (the inverse of a sum, a diagonal part, a square root) become new letters that remember
+their operands.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from .words import (
 )
 
 UNFOLDED = {"Jacobian": "𝒥 = B* φ* H*", "Lambda": "Λ = (B* Ω B)⁻¹"}
-"""Symbols that are written out at once."""
+"""Symbols that are replaced by their definitions."""
 LENGTH = 200
-"""Letters of a word at which writing out gives up."""
+"""Length of a word, in letters, at which expansion gives up."""
 OPERANDS = 40
-"""Inverses of sums, diagonal parts and roots in a statement at which writing it out gives up."""
+"""Number of inverses of sums, diagonal parts and roots in a statement at which expansion gives up."""
 MASS_MATRIX = parse("H φ M φ* H*")
 _TABLE = {s.name: (s.text, s.latex) for s in _core.symbols}
 
@@ -55,7 +55,7 @@ _TABLE = {s.name: (s.text, s.latex) for s in _core.symbols}
 class Opaque:
     """A letter that stands for the operand of an inverse, for a diagonal part or for a square root.
 
-    `name` is the letter; an inverse is that of its operand with the mark ⁻¹. `inner` is the operand in words.
+    `name` is the letter; the letter of an inverse is its operand's with the mark ⁻¹. `inner` is the operand in words.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Spelling(Step):
 
     @property
     def says_something(self) -> bool:
-        """Whether what was typed looks different."""
+        """True if the typed expression looks different."""
         return self.expression.text() != self.alphabet.text(self.before) or any(e.kind == "axiom" for e in self.definitions)
 
     def before_text(self) -> str:
@@ -102,20 +102,20 @@ class Spelling(Step):
 
 
 class Problem:
-    """The letters of one statement, and how its expressions are written in them."""
+    """The letters of one statement, and the expansion of its expressions in them."""
 
     def __init__(self) -> None:
         self.alphabet = Alphabet()
         self.opaque: list[Opaque] = []
         self.contexts: list[tuple[Any, Any]] = []  # (source, binding): the models at their states
-        self.relations: list[tuple[str, str, str]] = []  # (mark of a tree made of another, how, that one's mark)
+        self.relations: list[tuple[str, str, str]] = []  # (mark of a tree derived from another, how, the mark of that tree)
         self.sides: list[Polynomial] = []
-        self.of_one_model = False  # whether the statement was made of a model's expressions, and not read for all
-        self.unknown: set[str] = set()  # names of constants whose numbers are of no account
-        self.assumed: list[tuple[Equation, str]] = []  # hypotheses of the user's; a letter that one says to be definite
-        self.determinants: set[str] = set()  # letters of which ln|det| is taken: that they are regular is presupposed
-        self.scalars = False  # whether both sides are scalars: traces, determinants, norms
-        self.numbers = False  # whether both sides map R^1 to R^1
+        self.of_one_model = False  # True if the statement consists of one model's expressions, instead of text for all models
+        self.unknown: set[str] = set()  # names of constants whose values are ignored
+        self.assumed: list[tuple[Equation, str]] = []  # the user's hypotheses, with the letter that one declares definite
+        self.determinants: set[str] = set()  # operands of ln|det|, presupposed to be regular
+        self.scalars = False  # True if both sides are scalars: traces, determinants, norms
+        self.numbers = False  # True if both sides map R^1 to R^1
         self._named_operands = 0
         self._leaves: dict[Any, str] = {}
         self._definitions: dict[str, Equation] = {}
@@ -127,16 +127,16 @@ class Problem:
         return tuple(["", *FURTHER][: max(1, len(self.contexts))])
 
     def polynomials(self) -> list[Polynomial]:
-        """What the statement is made of: both sides, and the operands of the letters that it adds."""
+        """Return the polynomials of the statement: both sides, and the operands of the letters that it adds."""
         assumed = [p for equation, _ in self.assumed for p in (equation.lhs, equation.rhs)]
         return [*self.sides, *(o.inner for o in self.opaque), *assumed]
 
     def recursion_rules(self) -> list[tuple[Equation, Word]]:
-        """Equations between derivatives of one recursion, where diagonal blocks are taken: a statement without derivatives has none."""
+        """Return equations between derivatives of one recursion under blockdiag: none for a statement without derivatives."""
         return []
 
     def expand(self, expression: Any) -> Spelling:
-        """The expression in words, as the step that says so.
+        """Return the expression in words, with the step that states it.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class Problem:
 
     # ------------------------------------------------------------------ by kind
     def words(self, e: Any, transposed: bool = False) -> Polynomial:
-        """The expression, or its transpose, as a polynomial.
+        """Return the expression, or its transpose, as a polynomial.
 
         Raises
         ------
@@ -163,7 +163,7 @@ class Problem:
         return carried_out(self._words(e, transposed))
 
     def _words(self, e: Any, transposed: bool = False) -> Walk:
-        """As `words`: yields a walk for each part, and is sent what it comes to, so that no depth is too deep."""
+        """Do `words` as a generator that yields a walk for each part and is sent its result, so that depth is unlimited."""
         match e.kind:
             case "zero":
                 return {}
@@ -231,11 +231,11 @@ class Problem:
 
     # ------------------------------------------------------------------ letters
     def letter(self, e: Any) -> str:
-        """The letter that an expression is."""
+        """Return the letter of an expression."""
         return carried_out(self._letter(e))
 
     def operand(self, e: Any) -> str:
-        """The letter of what a determinant or norm is taken of: its own where it is one."""
+        """Return the letter of the operand of a determinant or norm: the operand itself if it is a letter."""
         return (
             self.letter(e) if e.kind in ("symbol", "constant") and e.name not in UNFOLDED else carried_out(self._operand("operand", e, e))
         )
@@ -278,7 +278,7 @@ class Problem:
         return mark
 
     def _other(self, e: Any) -> str:
-        """Vectors, constants, others' operators: letters of which nothing is known but what their kind says."""
+        """Add vectors, constants and external operators: letters with no known properties except their kind's."""
         vector = e.kind == "vector"
         if e.kind == "constant" and e.name in self.unknown:
             return self._named(f"‹{e.text()}›", Letter("", e.text(), e.latex(), False, "full", None, e))
@@ -286,7 +286,7 @@ class Problem:
         return self._named(f"‹{e.text()}›", Letter("", e.text(), e.latex(), not vector and bool(e.is_symmetric), shape, None, e))
 
     def _named(self, name: str, letter: Letter) -> str:
-        """Adds a letter under a name that no other has."""
+        """Add a letter under an unused name."""
         while name in self.alphabet.letters:
             name = "‹" + name + "›"
         self.alphabet.add(Letter(name, letter.text, letter.latex, letter.symmetric, letter.shape, letter.ascii, letter.expression))
@@ -303,7 +303,7 @@ class Problem:
             text, latex = self._shown(inner, e) if kind in ("inverse", "operand") else (e.text(), f"{{{e.latex()}}}")
             symmetric = kind == "blockdiag" and bool(e.is_symmetric)
             shape = "diagonal" if kind in ("blockdiag", "sqrt", "half") else "full"
-            known = e.written_out() if isinstance(e, Formula) else e  # of a formula with derivatives, what it is
+            known = e.written_out() if isinstance(e, Formula) else e  # a formula with derivatives, expanded
             self.alphabet.add(Letter(name, text, latex, symmetric, shape, None, known))
             definition = Equation("definition", f"{text} = {self.alphabet.text(inner)}", monomial(name), inner)
             self.opaque.append(Opaque(name, kind, e, inner, definition))
@@ -314,7 +314,7 @@ class Problem:
         return found
 
     def _factor(self, inner: Polynomial) -> str:
-        """The name of A = I + HφK, where these words are that: the innovations factor of a model goes by one name."""
+        """Return the name of A = I + HφK if these words are the innovations factor of a model, which has one name."""
         for mark in self.marks:
             base = next((base for m, how, base in self.relations if m == mark and how in SAME_EDGES), mark)
             if inner == factors.of(factors.FACTOR, mark, base) and factors.name_of(mark) not in self.alphabet.letters:
@@ -322,7 +322,7 @@ class Problem:
         return ""
 
     def _shown(self, inner: Polynomial, e: Any) -> tuple[str, str]:
-        """How the operand of an inverse is called: ℳ where it is that, X₁, X₂, ... where its own text is long."""
+        """Return the displayed name of the operand of an inverse: ℳ for the mass matrix, X₁, X₂, ... if its own text is long."""
         if inner == MASS_MATRIX:
             return "ℳ", "\\mathcal{M}"
         text = self.alphabet.text(inner)
@@ -334,7 +334,7 @@ class Problem:
 
 
 def symbol_parts(e: Any) -> tuple[Any, str, tuple[Any, ...], Any]:
-    """(source, ASCII name, arguments: what it is of, binding) of a symbol."""
+    """Return (source, ASCII name, arguments, binding) of a symbol."""
     letter = e.letter
     return letter.source, letter.name, letter.arguments, letter.binding
 
@@ -344,13 +344,13 @@ def _same_state(a: Any, b: Any) -> bool:
 
 
 def exact(coefficient: float | Fraction) -> Number:
-    """A coefficient as the number that it is."""
+    """Return the exact value of a coefficient."""
     if isinstance(coefficient, float) and not math.isfinite(coefficient):
-        raise _core.EvaluationError(f"a coefficient {coefficient} is no number to reckon with")
+        raise _core.EvaluationError(f"the coefficient {coefficient} is not a finite number")
     return ratio(Fraction(coefficient), 1)
 
 
 def square(factor: Any) -> bool:
-    """Whether a factor is square by meaning: H may be square by accident."""
+    """Return True if a factor is square by definition; H may be square by accident."""
     domain, codomain = factor.domain, factor.codomain
     return domain is None or domain == codomain or domain.dual == codomain

@@ -1,4 +1,4 @@
-"""ℳ + J by its innovations factors, as the book has it: A D A*, A = I + HφK, and A⁻¹ = I - HψK."""
+"""ℳ + J by its innovations factors, as in the book: A D A*, A = I + HφK, and A⁻¹ = I - HψK."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Reduction = Callable[[Polynomial], tuple[Polynomial, list[Step]]]
 
 @dataclass
 class Factor:
-    """The letter A of one model, with what it is: `definition` A = I + HφK, `inverse` A⁻¹ = I - HψK."""
+    """The letter A of one model, with `definition` A = I + HφK and `inverse` A⁻¹ = I - HψK."""
 
     name: str
     definition: Equation
@@ -26,7 +26,7 @@ class Factor:
 
     @property
     def premises(self) -> list[Equation]:
-        """What shows that A has an inverse."""
+        """Equations that show that A has an inverse."""
         return [self.inverse.steps[0].uses[0].equation, *self.inverse.uses]
 
 
@@ -36,7 +36,7 @@ def name_of(mark: str) -> str:
 
 
 def letter(alphabet: Alphabet, mark: str, base: str, context: tuple[Any, Any] | None) -> tuple[str, Equation]:
-    """(A of a model, its definition), added to the alphabet."""
+    """Add A of a model to the alphabet; return it with its definition."""
     name = name_of(mark)
     if name not in alphabet.letters:
         expression = None
@@ -50,14 +50,14 @@ def letter(alphabet: Alphabet, mark: str, base: str, context: tuple[Any, Any] | 
 
 
 def of(p: Polynomial, mark: str, base: str) -> Polynomial:
-    """A polynomial of the first model's letters for another model."""
+    """Return a polynomial in the first model's letters for another model."""
     return {marked(word, mark, base): c for word, c in p.items()}
 
 
 def factorization(
     X: str, c: Number, definition: Equation, factor: Factor, mark: str, alphabet: Alphabet, reduce: Reduction
 ) -> Equation | None:
-    """The lemma X = c A D A*, both sides brought to one form; None if they do not come there."""
+    """Return the lemma X = c A D A*, with both sides reduced to one form; None if their forms differ."""
     D, A, star = of_model("D", mark), factor.name, alphabet.star(factor.name)
     word = monomial(A, D, star, c=c)
     opened = word

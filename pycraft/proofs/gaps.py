@@ -1,4 +1,4 @@
-"""A derivation with lines left out: which can be, how it is shown with its gaps, and hints."""
+"""A derivation with lines left out: the possible gaps, the display with gaps, and hints."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _Own = TypeVar("_Own", bound="WithGaps")
 
 
 class WithGaps:
-    """A derivation with lines left out: how it is shown, and hints; `Exercise` judges answers."""
+    """A derivation with lines left out: display and hints; `Exercise` judges answers."""
 
     def __init__(self, proof: Proof, model: Any = None, blank: int | Sequence[int] | None = None, seed: int = 0):
         self.proof, self._model, self._read = proof, model, proof._read
@@ -41,7 +41,7 @@ class WithGaps:
 
     def _leave_out(self, blanks: set[int]) -> None:
         if not blanks:
-            raise _core.EvaluationError("an exercise leaves out one line or more: blank=[] names none")
+            raise _core.EvaluationError("an exercise leaves out at least one line; blank=[] names none")
         for line in blanks:
             if not 1 <= line <= len(self.steps):
                 raise _core.EvaluationError(f"there is no line {line} to leave out: the derivation has lines 1 to {len(self.steps)}")
@@ -49,15 +49,15 @@ class WithGaps:
         self.blank = self.blanks[0]
 
     def leaving_out(self: _Own, *blanks: int) -> _Own:
-        """The same derivation with other lines left out, by their numbers as it is shown here; see `gaps`."""
+        """Return the same derivation with other lines left out, by their numbers as shown here; see `gaps`."""
         other = copy(self)
         other._leave_out(set(blanks))
         return other
 
     def gap(self: _Own, blank: int) -> _Own:
-        """The exercise at one of its gaps; the others stay open."""
+        """Return the exercise at one of its gaps; the other gaps stay open."""
         if blank not in self.blanks:
-            raise _core.EvaluationError(f"line {blank} is no gap of this exercise; its gaps are {', '.join(map(str, self.blanks))}")
+            raise _core.EvaluationError(f"line {blank} is not a gap of this exercise; its gaps are {', '.join(map(str, self.blanks))}")
         other = copy(self)
         other.blank = blank
         return other
@@ -68,7 +68,7 @@ class WithGaps:
         return steps[0].full()[0], steps[-1].full()[1]
 
     def _polynomials(self) -> list[Polynomial]:
-        """Of every line, as one who types it has it: operands of inverses written out."""
+        """Return the polynomial of every line as a user would type it, with operands of inverses written out."""
         lines = [self.steps[0].full()[0], *(s.full()[1] for s in self.steps)]
         for o in self._problem().opaque:
             for equation in (o.definition, o.definition.transposed(self.proof._alphabet)) if o.kind == "inverse" else ():
@@ -78,7 +78,7 @@ class WithGaps:
         return lines
 
     def gaps(self) -> list[int]:
-        """Lines that can be left out: those that say something other than the line before and the line after; else any."""
+        """Return the lines that can be left out: lines that differ from the line before and the line after; else any."""
         return self._gaps() or list(range(1, len(self.steps))) or [len(self.steps)]
 
     def _gaps(self) -> list[int]:
@@ -103,17 +103,17 @@ class WithGaps:
 
     @property
     def statement(self) -> str:
-        """The theorem; its right side is a question where that is the line left out."""
+        """The theorem; its right side is a question if that line is left out."""
         return f"{self.lines[0]} = ?" if self._end_is_open else self.proof.statement
 
     def _operators(self) -> Any:
-        """Those that answers are read on."""
+        """Operator set on which answers are read."""
         if self._model is not None:
             return operators_of(self._model)
         return operators_of_sources(source for source, _ in self.proof._contexts) or example().soa
 
     def _abbreviations(self) -> dict[str, Any]:
-        """Vectors and constants by their names, and X₁, ... as the derivation shows them."""
+        """Return vectors and constants by their names, and X₁, ... as shown in the derivation."""
         problem, letters = self._problem(), self.proof._alphabet.letters.values()
         named = {
             x.text: x.expression
@@ -128,7 +128,7 @@ class WithGaps:
         return found
 
     def _problem(self) -> DerivativeProblem:
-        """The statement's letters, made anew as the proof made them."""
+        """Return the statement's letters, rebuilt as in the proof."""
         problem = DerivativeProblem()
         problem.sides = [problem.expand(side).before for side in (self._read.lhs, self._read.rhs)]
         return problem
@@ -149,7 +149,7 @@ class WithGaps:
     __repr__ = __str__
 
     def latex(self) -> str:
-        """The derivation as an aligned display, a box for the gap."""
+        """Return the derivation as an aligned display, with a box for the gap."""
         return aligned(self.steps, blanks=self.blanks)
 
     def _repr_latex_(self) -> str:
@@ -159,17 +159,17 @@ class WithGaps:
 
     # ------------------------------------------------------------------ help
     def hint(self, level: int = 1) -> str:
-        """1: the equation that leads to the line; 2: where it is used; 3: the line's beginning; beyond that, the line."""
+        """Return a hint by level. 1: the equation that gives the line; 2: its place; 3: the line's beginning; above 3: the line."""
         if not isinstance(level, int):
-            raise _core.EvaluationError(f"hints have the levels 1, 2, 3 and more, not {level!r}")
+            raise _core.EvaluationError(f"level must be 1, 2, 3 or more, not {level!r}")
         step = self.steps[self.blank - 1]
         there = any(u.left + u.word + u.right in step.full()[0] for u in step.uses)
         if level <= 1:
             return f"use {step.reason}{'' if there else ', read backwards'}" if step.uses else f"{step.reason}: no axiom is needed"
         if level == 2:
             places = dict.fromkeys(f"{part} in {word}" if part != word else part for word, _, part in step.positions)
-            verb = "replace {}" if there else "{} is to appear"
-            return verb.format("; ".join(places)) if places else "multiply out, and collect what is equal"
+            verb = "replace {}" if there else "make {} appear"
+            return verb.format("; ".join(places)) if places else "multiply out, and collect equal terms"
         words = list(step.after.items())
         if level == 3 and words:
             count = "one term" if len(words) == 1 else f"{len(words)} terms"
@@ -178,17 +178,17 @@ class WithGaps:
         return self.solution()
 
     def solution(self) -> str:
-        """The line left out, and what leads to it."""
+        """Return the line left out, and the equation that leads to it."""
         step = self.steps[self.blank - 1]
         return f"{step.after_text()}   [{step.reason}]"
 
 
 def _lines_of(blank: Any) -> set[int]:
-    """The lines to leave out, of one number or several."""
+    """Return the lines to leave out, from one number or several."""
     given = [blank] if isinstance(blank, Integral) else blank
     if isinstance(given, str) or not isinstance(given, Iterable):
-        raise _core.EvaluationError(f"blank={blank!r}: the number of a line, or several")
+        raise _core.EvaluationError(f"blank={blank!r}: give the number of a line, or several numbers")
     lines = list(given)
     if any(isinstance(line, bool) or not isinstance(line, Integral) for line in lines):
-        raise _core.EvaluationError(f"blank={blank!r}: lines are told by their numbers, from 1")
+        raise _core.EvaluationError(f"blank={blank!r}: give line numbers, from 1")
     return set(map(int, lines))

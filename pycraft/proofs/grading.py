@@ -1,4 +1,4 @@
-"""The judge of what is filled into a gap: who accepts proofs and nothing else, and says of the rest by how much it is off, and why."""
+"""The judge of answers: it accepts only proofs, and for other answers reports the error and its reason."""
 
 from __future__ import annotations
 
@@ -26,32 +26,32 @@ from .walk import GaveUp
 from .words import ONE, Alphabet, Polynomial, Word, combine, number, ratio, split
 
 LIKELY = 1.5
-"""Slips up to this cost are told of a line that does not fit: a star, a tilde, a sign, the order, a letter written for one near it."""
+"""Largest cost of a slip that is reported for a line that does not fit: a star, a tilde, a sign, the order, or a similar letter."""
 SLIPS = 2.0
-"""CPU seconds for the slip of a line that does not fit."""
+"""CPU seconds for the search of a slip in a line that does not fit."""
 ACCEPTED = ("right", "another road")
 _SAYS = {
-    "J = 0": "a hinge-diagonal term J is lost",
-    "serial chain": "on a branched tree blocks between siblings are lost",
-    "single-DOF hinges": "HΔ = 0 is said of hinges with one coordinate",
+    "J = 0": "a hinge-diagonal term J is missing",
+    "serial chain": "on a branched tree, blocks between siblings are missing",
+    "single-DOF hinges": "HΔ = 0 holds for hinges with one coordinate",
     "constant H": "H is constant for hinges of one subhinge, not of several",
 }
-# Letters that are taken for each other.
+# Letters that are often confused.
 _CONFUSED = [("φ", "ψ"), ("φ̃", "ψ̃"), ("E_φ", "E_ψ"), ("φ", "φ̃"), ("ψ", "ψ̃"), ("M", "P", "R", "P⁺"), ("G", "K"), ("τ", "τ̄"), ("Ω", "Υ")]
 
 
 @dataclass
 class Judgement:
-    """What was said of an answer: true as a condition if it was accepted.
+    """Judgement of an answer: true as a condition if it was accepted.
 
     Attributes
     ----------
-    verdict : "right"; "another road", true and proved, but not by one equation from line to line; "no step", a line that is there already;
+    verdict : "right"; "another road", true and proved, but not by one equation from line to line; "no step", an existing line repeated;
         "unproved", neither proved nor refuted; "wrong"; "unreadable"
-    text : why, in sentences
-    residual : by how much it is off, relative, on `model`; None where nothing was evaluated
-    missed : hypotheses and equations that the answer took for granted
-    proof : that it equals the line before, also if only under more hypotheses; None if none was found
+    text : the reasons, in sentences
+    residual : relative error on `model`; None if not evaluated
+    missed : hypotheses and equations that the answer assumes
+    proof : proof that it equals the line before, possibly under more hypotheses; None if none was found
     """
 
     verdict: str
@@ -71,21 +71,21 @@ class Judgement:
 
 
 class Exercise(WithGaps):
-    """A derivation with a gap or several whose answers are judged, see `exercise`.
+    """A derivation with gaps, which judges answers; see `exercise`.
 
     Attributes
     ----------
     proof : the whole proof
-    steps : the derivation shown: the proof's, with lemmas opened where it has too few lines to leave one out
+    steps : the displayed derivation: the proof, with lemmas expanded if it has too few lines to leave one out
     blanks : the numbers of the lines left out
-    blank : the one that `answer`, `hint` and `solution` are about: the first, see `gap`
+    blank : the gap to which `answer`, `hint` and `solution` apply: the first, see `gap`
     """
 
     def answer(self, line: Any) -> Any:
-        """Judge a line: an expression, or text in Unicode, ASCII or LaTeX; of several gaps {number: line}, which gives {number: Judgement}.
+        """Judge a line: an expression, or text in Unicode, ASCII or LaTeX; for several gaps {number: line}, returning {number: Judgement}.
 
         It is right if it is the line left out, or proved equal to the lines before and after, each by a single equation. Cost:
-        milliseconds; where it is not accepted, a tenth of a second for the reasons.
+        milliseconds; if it is not accepted, a tenth of a second for the reasons.
         """
         if isinstance(line, Mapping):
             return {blank: self.gap(blank).answer(given) for blank, given in line.items()}
@@ -119,24 +119,24 @@ class Exercise(WithGaps):
         return self._refused(problem, expression, given, found, allowed)
 
     def _expression(self, line: Any) -> Any:
-        """The answer as an expression between the spaces of the theorem."""
+        """Return the answer as an expression between the spaces of the theorem."""
         lhs = self._read.lhs
         if isinstance(line, str):
             text = line.strip().removeprefix("=").strip()
             read = self._read_text.read(text)
             if read.rhs is not None:
-                raise _core.EvaluationError(f"{text!r} is a statement: the line is one expression, equal to the line before")
+                raise _core.EvaluationError(f"{text!r} is a statement; give one expression, equal to the line before")
             line = read.lhs
         if is_number(line) and line == 0:
             return _core.zero(lhs.domain, lhs.codomain)
         if not isinstance(line, _core.Operator):
-            raise _core.EvaluationError(f"a line is an operator, not {line!r}")
+            raise _core.EvaluationError(f"a line must be an operator, not {line!r}")
         if not {id(s) for s in line.sources} <= {id(s) for s in lhs.sources}:
             line = transferred(line, self._operators())
         return line @ _core.identity(lhs.domain) if line.domain is None and lhs.domain == lhs.codomain else line
 
     def _written_wrong(self, line: str) -> str:
-        """What one slip of the pen would make of a line that fits nowhere the theorem's left side, in words; empty where none would."""
+        """Return in words the slip that explains a line whose spaces do not fit the theorem; empty if there is none."""
         try:
             formula = read_formula(f"{line.strip().removeprefix('=')} = {self.lines[0]}")
         except ParseError:
@@ -145,7 +145,7 @@ class Exercise(WithGaps):
         return next((slip.words for new, slip in near if new[1] == formula[1] and slip.cost <= LIKELY), "")
 
     def _misfit(self, line: Any) -> str | None:
-        """What is said of a line between other spaces than the theorem's."""
+        """Return the message for a line between other spaces than the theorem's."""
         lhs = self._read.lhs
         if (line.domain, line.codomain) == (lhs.domain, lhs.codomain):
             return None
@@ -153,7 +153,7 @@ class Exercise(WithGaps):
         return f"the lines of this derivation map {spaces[0]}, and {line.text()} maps {spaces[1]}"
 
     def _proved(self, expression: Any, allowed: frozenset[str]) -> Proof | None:
-        """A proof that the line equals a side of the theorem: under the theorem's hypotheses, else under more."""
+        """Return a proof that the line equals a side of the theorem, under the theorem's hypotheses or else under more."""
         proofs = []
         for side in (self._read.lhs, self._read.rhs):
             proof = prove(side, expression, self._model)
@@ -163,7 +163,7 @@ class Exercise(WithGaps):
         return proofs[0] if proofs else None
 
     def _accepted(self, problem: DerivativeProblem, lines: Sequence[Polynomial], given: Polynomial, proof: Proof) -> Judgement:
-        """Right if one equation leads to it and one onward."""
+        """Return "right" if one equation leads to the line and one leads on, else "another road"."""
         may = list(candidates(problem, frozenset(self.proof.hypotheses), self.steps))
         to = single_equation(lines[self.blank - 1], given, may, problem.alphabet)
         onward = None if self._last else single_equation(given, lines[self.blank + 1], may, problem.alphabet)
@@ -182,13 +182,13 @@ class Exercise(WithGaps):
     def _refused(
         self, problem: DerivativeProblem, expression: Any, given: Polynomial, found: Proof | None, allowed: frozenset[str]
     ) -> Judgement:
-        """Wrong if numbers refute it, and why; else unproved."""
+        """Return "wrong" with the reason if values refute the line, else "unproved"."""
         if void := self._void(problem, expression, allowed):
             return Judgement("wrong", void)
         residual, model = self._off(expression, allowed)
         if residual is None:
             proved = "no proof was found" if found is None else f"a proof was found only where {' and '.join(found.hypotheses)}"
-            text = f"{proved}, and no number refutes it: it is not accepted"
+            text = f"{proved}, and no value refutes it: it is not accepted"
             return Judgement("unproved", text, model=model, proof=found)
         text = f"off by {residual:.1e}, relative, on {_described(model)}"
         missed: list[str] = []
@@ -209,13 +209,13 @@ class Exercise(WithGaps):
         return Judgement("wrong", text, residual, model, missed, found)
 
     def _void(self, problem: DerivativeProblem, expression: Any, allowed: frozenset[str]) -> str:
-        """Why an inverse or a root of the line exists nowhere under the theorem's hypotheses; empty if nothing says so."""
+        """Return why an inverse or a root in the line exists nowhere under the theorem's hypotheses; empty if none is known to fail."""
         claim = Proof.of_statement(Statement(expression, expression, "", "expressions"), problem, [], [], ({}, {}))
         claim.takes_for_granted([o.name for o in problem.opaque if o.kind == "inverse"])
         return claim.void_where(sorted(allowed), self._operators())
 
     def _off(self, expression: Any, allowed: frozenset[str]) -> tuple[float | None, Any]:
-        """(residual, model) where the line is refuted, under the theorem's hypotheses; (None, the last model) if nowhere."""
+        """Return (residual, model) of a refutation under the theorem's hypotheses; (None, the last model) if there is none."""
         candidates = [self._operators()] if self._model is not None else []
         candidates = [c for c in candidates if len(c.F) <= LARGEST and all(c._source.traits.get(h, True) for h in allowed)]
         at: Any = None
@@ -230,7 +230,7 @@ class Exercise(WithGaps):
         return None, at
 
     def _slip(self, problem: DerivativeProblem, given: Polynomial, allowed: frozenset[str]) -> str:
-        """What one change of a sign, a coefficient, a star or a letter would make true."""
+        """Return the change of one sign, coefficient, star or letter that would make the line true."""
         settings = [(s, extra) for s, extra in _settings(problem) if s.hypotheses <= allowed]
         a = problem.alphabet
         try:
@@ -238,10 +238,12 @@ class Exercise(WithGaps):
             form = {w: attempt.reduce({w: ONE})[0] for w in given}
             off = attempt.reduce(combine((1, problem.sides[0]), (-1, given)))[0]
             line = self._polynomials()[self.blank]
-            suspects = sorted(given.items(), key=lambda term: line.get(term[0]) == term[1])  # what differs from the line left out first
+            suspects = sorted(
+                given.items(), key=lambda term: line.get(term[0]) == term[1]
+            )  # first the terms that differ from the missing line
             for word, c in suspects:
                 if off == combine((-2 * c, form[word])):
-                    return f"a sign, that of {a.word_text(word)}"
+                    return f"the sign of {a.word_text(word)}"
             changes = [(w, c, other, said) for w, c in suspects for other, said in _changed(w, a)]
             for word, c, other, said in changes:
                 if other in line and off == combine((c, attempt.reduce({other: ONE})[0]), (-c, form[word])):
@@ -253,7 +255,11 @@ class Exercise(WithGaps):
                 shared = {ratio(x, form[word][w]) for w, x in off.items() if w in form[word]}
                 if len(shared) == 1 and off == combine((k := shared.pop(), form[word])):
                     wanted = number(c + k) if c + k >= 0 else f"−{number(-c - k)}"
-                    return f"the coefficient of {a.word_text(word)} should be {wanted}" if c + k else f"{a.word_text(word)} is too much"
+                    return (
+                        f"the coefficient of {a.word_text(word)} should be {wanted}"
+                        if c + k
+                        else f"{a.word_text(word)} should not be there"
+                    )
             for word, c, other, said in changes:
                 if off == combine((c, attempt.reduce({other: ONE})[0]), (-c, form[word])):
                     return f"in {a.word_text(word)} {said}"
@@ -274,7 +280,7 @@ def _by(step: Step) -> str:
 
 
 def _changed(word: Word, alphabet: Alphabet) -> Iterator[tuple[Word, str]]:
-    """Words with one letter transposed, inverted or taken for another, and what to say."""
+    """Yield words with one letter transposed, inverted or replaced, and the message."""
     for i, letter in enumerate(word):
         name, mark = split(letter)
         others = [alphabet.star(letter)] + ([name + {"": "⁻¹", "⁻¹": ""}[mark]] if name == "D" and mark in ("", "⁻¹") else [])

@@ -1,7 +1,7 @@
-"""The inverses of what a statement inverts: sums and products that stand as letters of their own.
+"""Inverses in a statement, of sums and products that have their own letters.
 
-X⁻¹ = Z where a candidate Z shows XZ = I and ZX = I: for X a single word, for X one of the operators whose inverse is known, for X an
-operator whose inverse stands elsewhere in the statement. Otherwise XX⁻¹ = I and X⁻¹X = I are rules, with X in its normal form.
+X⁻¹ = Z if a candidate Z satisfies XZ = I and ZX = I: for X a single word, for X one of the operators with a known inverse, for X an
+operator whose inverse occurs elsewhere in the statement. Otherwise XX⁻¹ = I and X⁻¹X = I are rules, with X in its normal form.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ KNOWN_INVERSES = [
     ("H φ M φ* H* + J", "D⁻¹ − D⁻¹ H ψ K − K* ψ* H* D⁻¹ + K* ψ* H* D⁻¹ H ψ K"),
     ("φ M φ*", "φ⁻* M⁻¹ φ⁻¹"),
 ]
-"""Pairs X, Z with XZ = ZX = I: candidates only, each is proved where it is used."""
+"""Pairs X, Z with XZ = ZX = I: only candidates, each proved when used."""
 
 
 class Inverses:
-    """What is known of the inverses in a statement, added to its rules one after the other."""
+    """Known facts on the inverses in a statement, added to its rules one after another."""
 
     def __init__(self, local: LocalRules):
         self.local, self.problem, self.alphabet = local, local.problem, local.alphabet
@@ -54,11 +54,11 @@ class Inverses:
 
     @property
     def found_factors(self) -> list[factors.Factor]:
-        """The innovations factors A = I + HφK that were asked for and have their inverse."""
+        """Innovations factors A = I + HφK that were used and have their inverse."""
         return [factor for factor in self._factors.values() if factor is not None]
 
     def add(self, o: Opaque) -> None:
-        """What is known of X⁻¹. Raises Void where X is zero."""
+        """Add the known facts on X⁻¹. Raises Void if X is zero."""
         X, a = o.name, self.alphabet
         form, steps = self.local.reduce(o.inner)
         if not form:
@@ -84,7 +84,7 @@ class Inverses:
         self._forms.append((X, form))
 
     def _by_structure(self, X: str, inner: Polynomial, form: Polynomial, steps: list[Step]) -> None:
-        """X regular, where its words say so: as they were written, or in normal form."""
+        """Record X as regular if its words imply it, as written or in normal form."""
         for p, premises in ((inner, ()), (form, [e for step in steps for e in step.premises()])):
             definite = is_positive_definite(p, self.alphabet, self.local.setting.hypotheses, self.local.definite)
             if definite or is_triangular(p, self.alphabet):
@@ -93,7 +93,7 @@ class Inverses:
                 return
 
     def _by_factors(self, o: Opaque, form: Polynomial) -> bool:
-        """X⁻¹ where X is ℳ + J, by its factors."""
+        """Return X⁻¹ of X = ℳ + J, by its factors."""
         found = self.factored(o.name, form, o.definition)
         if found is None:
             return False
@@ -107,7 +107,7 @@ class Inverses:
         return True
 
     def factor(self, mark: str) -> factors.Factor | None:
-        """A = I + HφK of one model, with its inverse; None if that is not shown."""
+        """Return A = I + HφK of one model, with its inverse; None if the inverse is not proved."""
         if mark not in self._factors:
             base = self.local.base(mark)
             context = self.problem.contexts[self.problem.marks.index(mark)] if self.problem.contexts else None
@@ -117,7 +117,7 @@ class Inverses:
         return self._factors[mark]
 
     def factored(self, X: str, form: Polynomial, definition: Equation) -> tuple[Equation, factors.Factor, str, Number] | None:
-        """(X = c A D A*, A, the mark of its model, c) of a letter with this definition and normal form; None if it is not that."""
+        """Return (X = c A D A*, A, the mark of its model, c) of a letter with this definition and normal form; None for another letter."""
         key, scale = scaled(form)
         for mark in self.problem.marks:
             base = self.local.base(mark)
@@ -130,7 +130,7 @@ class Inverses:
         return None
 
     def _candidates(self, form: Polynomial) -> Iterator[Polynomial]:
-        """What may be the inverse of an operator with this normal form."""
+        """Yield candidates for the inverse of an operator with this normal form."""
         if len(form) == 1:
             ((word, c),) = form.items()
             if all(plain(x) in ("φ", "ψ", "D", "M", "P", "R", "Υ") or inverted(x) for x in word):
@@ -148,7 +148,7 @@ class Inverses:
                     yield {(inverse_of(name),): ratio(its_scale, scale)}
 
     def _inverse_is(self, X: str, inner: Polynomial, z: Polynomial, definition: Equation) -> Equation | None:
-        """The lemma X⁻¹ = Z, by XZ = I and ZX = I; None if these do not come out."""
+        """Return the lemma X⁻¹ = Z, by XZ = I and ZX = I; None if these are not proved."""
         a, Y = self.alphabet, inverse_of(X)
         halves = []
         shown = a.letter_text(X)
@@ -165,11 +165,11 @@ class Inverses:
             Step(second, z, [Use(c, (), pair, w, (Y, X)) for w, c in z.items()], a),
         ]
         text = f"{a.letter_text(Y)} = {a.text(z)}"
-        note = "both products are I between equal spaces, so that the one is the inverse of the other"
+        note = "both products are I between equal spaces, so each factor is the inverse of the other"
         return Equation("lemma", text, {(Y,): ONE}, z, steps=numbered(steps), uses=[halves[1]], note=note)
 
     def _times_inverse(self, o: Opaque, left: Word, right: Word, form: Polynomial, steps: list[Step]) -> Equation:
-        """left (the normal form of X) right = I, where one of left and right is X⁻¹ and the other I."""
+        """Return left (the normal form of X) right = I, with X⁻¹ for one of left and right and I for the other."""
         a, whole = self.alphabet, (*left, o.name, *right)
         chain = [step.reversed().between(left, right) for step in reversed(steps)]
         chain.append(Step(framed(left, o.inner, right), {whole: ONE}, [Use(-ONE, left, o.definition, right, (), False)], a))
@@ -192,7 +192,7 @@ def _known_inverses(setting: Setting) -> dict[tuple, list[tuple[Polynomial, Numb
 
 
 def _unmarked(letter: str, mark: str) -> str:
-    """A letter of a further model as the first has it; letters of other models stay apart."""
+    """Return a letter of a further model as the first model's letter; letters of other models stay distinct."""
     name, done = split(letter)
     if not mark:
         return letter

@@ -1,8 +1,8 @@
-"""Statements by block as statements of operators, where they are that: what is said of every body k, its parent and its children.
+"""Statements by block as statements of operators, if possible: statements for every body k, its parent and its children.
 
-V(k) = φ*(℘(k),k)V(℘(k)) + H*(k)θ̇(k) is V = E_φ*V + H*θ̇. A way from body to body in a product is an operator between them: φ(k,j) of
-a child j of k is the block of E_φ there, ψ(k,j) that of E_ψ, and φ*(℘(k),k) that of E_φ*. Σ_{j∈C(k)} φ(k,j)X(j)φ*(k,j) are the blocks of
-E_φXE_φ*, which has none beside its diagonal; φ*(℘(k),k)X(℘(k))φ(℘(k),k) are those on the diagonal of E_φ*XE_φ. ∏_k det X(k) is det X,
+V(k) = φ*(℘(k),k)V(℘(k)) + H*(k)θ̇(k) is V = E_φ*V + H*θ̇. A step from body to body in a product is an operator between them: φ(k,j) of
+a child j of k is a block of E_φ, ψ(k,j) of E_ψ, and φ*(℘(k),k) of E_φ*. Σ_{j∈C(k)} φ(k,j)X(j)φ*(k,j) are the blocks of
+E_φXE_φ*, which is block diagonal; φ*(℘(k),k)X(℘(k))φ(℘(k),k) are the diagonal blocks of E_φ*XE_φ. ∏_k det X(k) is det X,
 Σ_k tr X(k) is tr X, Σ_k ln det X(k) is ln det X, and Σ_k J(k)*X(k)J(k) of the rows J(k) of J is J*XJ.
 """
 
@@ -18,15 +18,15 @@ _STEPS = {"phi": "E", "psi": "E_psi"}
 
 
 class NotLifted(Exception):
-    """It is no statement of operators."""
+    """The statement by block is not a statement of operators."""
 
 
 Kind = Callable[[str], str]
-"""Of a letter: "blocks" on the diagonal, "vector", "rows" from hinges to bodies, or another."""
+"""Kind of a letter: "blocks" on the diagonal, "vector", "rows" from hinges to bodies, or another."""
 
 
 def lifted(read: BlockStatement, kind: Kind) -> str | None:
-    """The statement of operators, in the grammar's spelling; None where it is none."""
+    """Return the statement of operators, in the grammar's spelling; None if there is none."""
     if read.relations or len(read.indices) > 1:
         return None
     k = read.indices[0] if read.indices else ""
@@ -64,7 +64,7 @@ def _squared(factors: tuple[Node, ...], k: str, kind: Kind) -> str:
 
 
 def _factors(node: Node, k: str) -> tuple[list[Node], dict[str, str]]:
-    """(the factors of a term, the sum over children of k opened; the children's letter and its parent's)."""
+    """Return the factors of a term with the sum over children of k expanded, and the letters of the child and its parent."""
     factors = list(node.factors) if isinstance(node, Product) else [node]
     opened: list[Node] = []
     children: dict[str, str] = {}
@@ -80,7 +80,7 @@ def _factors(node: Node, k: str) -> tuple[list[Node], dict[str, str]]:
 
 
 def _product(node: Node, k: str, kind: Kind) -> str:
-    """A term, way by way; in brackets of blockdiag where it leads to the parent and back."""
+    """Return a term step by step, within blockdiag if it leads to the parent and back."""
     factors, children = _factors(node, k)
     at, up, text = k, False, []
     for factor in factors:
@@ -98,7 +98,7 @@ def _product(node: Node, k: str, kind: Kind) -> str:
 
 
 def _step(factor: Node, at: str, children: dict[str, str], k: str) -> tuple[str, str] | None:
-    """(the operator of a way from body to body, the body to which it leads back), None of what stays at a body."""
+    """Return the operator of a step from body to body and the body to which it leads back; None for a factor at one body."""
     starred = isinstance(factor, Star)
     letter = factor.inner if isinstance(factor, Star) else factor
     if not isinstance(letter, Letter) or len(letter.arguments) != 2:
@@ -112,7 +112,7 @@ def _step(factor: Node, at: str, children: dict[str, str], k: str) -> tuple[str,
 
 
 def _at(node: Node, at: str, kind: Kind, last: bool = False) -> str:
-    """What stays at a body, of all bodies: blocks, and with `last` vectors too, which nothing transposes."""
+    """Return a factor at one body as an operator: blocks, and with `last` also vectors, which are not transposed."""
     match node:
         case Number():
             return written(node)

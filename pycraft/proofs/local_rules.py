@@ -1,4 +1,4 @@
-"""The rules of one setting with those that a statement adds: what is assumed, what its letters are, what hypotheses say of them."""
+"""The rules of one setting and of one statement: its assumptions, the definitions of its letters, and its hypotheses."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ UNIT: Polynomial = {(): ONE}
 
 
 class LocalRules:
-    """The rules of one setting with those of the letters that a statement adds.
+    """The rules of one setting, and the rules of the letters that a statement adds.
 
     Attributes
     ----------
     rules : for normal forms; `block_rules` for operands of blockdiag, which need the recursions of R and Υ
-    equations : those added
+    equations : the added equations
     regular : letters that have an inverse
     definite : letters that are symmetric and positive definite
-    needs : of letters that have an inverse where others have, which these are
-    inverted : the inverses that stand in the statement
-    locked : (mark, the mark of its model) of trees with hinges locked, or loops embedded
+    needs : for letters whose inverse depends on other inverses, the letters of these
+    inverted : inverses in the statement
+    locked : (mark, the mark of its model) of trees with locked hinges or embedded loops
     """
 
     def __init__(self, problem: Problem, setting: Setting, extra: list[tuple[Equation, Word]]):
@@ -63,7 +63,7 @@ class LocalRules:
 
     # ------------------------------------------------------------------ what is asked
     def reduce(self, p: Polynomial) -> tuple[Polynomial, list[Step]]:
-        """(the normal form, the steps to it)."""
+        """Return the normal form and the steps to it."""
         return self.rules.reduce(p, self.alphabet)
 
     def pair(self, a: str, b: str) -> Equation:
@@ -76,19 +76,19 @@ class LocalRules:
         return Equation("inverse", f"{self.alphabet.word_text(word)} = I", {word: ONE}, UNIT)
 
     def base(self, mark: str) -> str:
-        """The mark of the model that a tree with hinges locked was made of; the mark itself for others."""
+        """Return the mark of the model of a tree with locked hinges; the mark itself for other models."""
         return dict(self.locked).get(mark, mark)
 
     # ------------------------------------------------------------------ what is added
     def add(self, equation: Equation, word: Word, blocks: bool = True) -> None:
-        """A rule and its transpose, before all that are there."""
+        """Add a rule and its transpose before all others."""
         self.equations.append(equation)
         self._rank -= 1
         for rules in self._every_rules() if blocks else (self.rules,):
             rules.add_equation(equation, word, self.alphabet, self._rank)
 
     def add_untransposed(self, equation: Equation, word: Word) -> None:
-        """A rule whose transpose says the same, before all that are there."""
+        """Add a rule that equals its transpose before all others."""
         self.equations.append(equation)
         self._rank -= 1
         for rules in self._every_rules():
@@ -98,12 +98,12 @@ class LocalRules:
         return [self.rules] if self.block_rules is None else [self.rules, self.block_rules]
 
     def add_pairs(self, name: str) -> None:
-        """X X⁻¹ = I and X⁻¹ X = I of a letter."""
+        """Add X X⁻¹ = I and X⁻¹ X = I of a letter."""
         for pair in ((name, inverse_of(name)), (inverse_of(name), name)):
             self.add(self.pair(*pair), pair)
 
     def _add_recursions(self) -> None:
-        """Equations between derivatives of one recursion, for operands of blockdiag."""
+        """Add equations between derivatives of one recursion, for operands of blockdiag."""
         letters = {underived(plain(x)) for p in self.problem.polynomials() for w in p for x in w}
         if self.block_rules is None or "Υ" not in letters:
             return
@@ -112,14 +112,14 @@ class LocalRules:
             self.block_rules.add_equation(equation, word, self.alphabet, self._rank)
 
     def _add_constants(self, constants: dict[str, object]) -> None:
-        """What numbers of a user's constants say: that they are zero but at bodies on the base."""
+        """Add rules from the values of a user's constants: constants that are zero except at bodies on the base."""
         source = self.problem.contexts[0][0] if self.problem.contexts else None
         for name, e in constants.items():
             for equation, word in at_the_roots(name, e, source) if isinstance(e, _core.Operator) and e.kind == "constant" else ():
                 self.add(equation, word)
 
     def _assume(self, equation: Equation, name: str) -> None:
-        """A hypothesis of the user's as a rule; of X > 0, X* = X, and that X has an inverse."""
+        """Add a user's hypothesis as a rule; X > 0 implies X* = X, and that X has an inverse."""
         if name:
             self.regular.add(name)
             self.definite.add(name)
@@ -146,7 +146,7 @@ class LocalRules:
                 rules.add(rule_from(solved.transposed(self.alphabet), star, self._rank))
 
     def _world_axes(self) -> None:
-        """Letters in world axes by those of their model."""
+        """Add rules for letters in world axes, in letters of their model."""
         found = {
             x.replace("*", "") if not inverted(x) else inverse_of(split(x)[0]) for p in self.problem.polynomials() for w in p for x in w
         }

@@ -1,7 +1,7 @@
-"""The axioms of motion, and lemmas from them: what `axioms` has of a tree of matrices, for velocities of rigid bodies.
+"""The axioms of motion, and lemmas from them: like `axioms` for a tree of matrices, for velocities of rigid bodies.
 
-Ṽ acts on motions as V̄ on forces, up to the sign and the star; crossing a vector with itself gives nothing; and the cross of a body's
-velocity, carried from the parent, is that of the parent's velocity and of the hinge's: Ṽ φ*(p,k) = φ*(p,k) Ṽ(p) - Δ_θ̇* φ*(p,k), since a
+Ṽ acts on motions as V̄ on forces, up to the sign and the star; the cross product of a vector with itself is zero; and the cross of a body's
+velocity splits into the parent's, carried over, and the hinge's: Ṽ φ*(p,k) = φ*(p,k) Ṽ(p) - Δ_θ̇* φ*(p,k), since a
 change of frame carries crosses to crosses, crm(φ*x) φ* = φ* crm(x), and Δ_θ̇* = -crm(H*θ̇).
 """
 
@@ -31,7 +31,7 @@ LEMMAS: list[tuple[str, list[tuple[str, str]]]] = [
     ),
 ]
 
-# (the word that goes, the equation), in order of rank.
+# (the replaced word, the equation), in order of rank.
 ABBREVIATIONS = [("V", "V = φ* H* θ̇"), ("γ", "γ = − φ* a₀")]
 VELOCITIES = [
     ("a", "a = Ṽ H* θ̇ + Ḣ* θ̇"),
@@ -46,5 +46,5 @@ VELOCITIES = [
     ("Δ_θ̇* H* K* ψ*", "Δ_θ̇* H* K* ψ* = Δ_θ̇* − Δ_θ̇* ψ* + E_φ* Ṽ ψ* − Ṽ ψ* + Ṽ − Ṽ H* K* ψ*"),
 ]
 NAMES = {"Ṽ", "V̄", "𝓑", "Δ_θ̇", "Ḣ"}
-"""Letters with which a and b are opened, and these rules come in."""
+"""Letters that cause a and b to be expanded, and these rules to be used."""
 WEIGHTS = {"V": 9, "γ": 19, "a": 29, "b": 39, "V̄": 9, "𝓑": 20, "Δ_θ̇": 12, "Ṽ": 1}

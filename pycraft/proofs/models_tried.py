@@ -1,4 +1,4 @@
-"""The models that statements are read on and proofs are tried on: the one at hand, or small random ones that meet the hypotheses."""
+"""Models on which statements are read and proofs are evaluated: the given model, or small random ones that meet the hypotheses."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from ..operators.operator_set import OperatorSet
 
 
 def operators_of(model: Any) -> OperatorSet:
-    """The operators of a model, or these themselves."""
+    """Return the operators of a model; an operator set is returned unchanged."""
     return model if isinstance(model, OperatorSet) else model.soa
 
 
 def operators_of_sources(sources: Iterable[_core.SkoSource]) -> OperatorSet | None:
-    """The operators of the model that the first of these is of; None without any. It has states where it is a Multibody."""
+    """Return the operators of the model of the first source, None without sources. They have states if the model is a Multibody."""
     for source in sources:
         made = source.derived_from
-        source = made[1] if made is not None and made[0] == "loops" else source  # rows are of a tree, and none
+        source = made[1] if made is not None and made[0] == "loops" else source  # rows belong to a tree, and are not one
         model = source.model if isinstance(source, _core.MultibodyOperators) else None
         return OperatorSet(source, model if isinstance(model, Multibody) else None)
     return None
 
 
 def example(hypotheses: Sequence[str] = ()) -> Any:
-    """A small random model that meets these hypotheses, and fails the others."""
+    """Return a small random model that meets these hypotheses and fails the others."""
     kinds = ["universal", "ball", "pin", "slider"]
     if "constant H" in hypotheses:
         kinds = ["free", "ball", "pin", "slider"]
@@ -41,8 +41,8 @@ def example(hypotheses: Sequence[str] = ()) -> Any:
 
 
 def examples(hypotheses: Sequence[str] = ()) -> list[Any]:
-    """Small random models that meet these hypotheses: `example`; a path of six bodies or more, on which powers of E_φ that vanish on
-    a short one are seen; one whose hinges are all free, where H, Υ and compliances of several nodes are regular."""
+    """Return small random models that meet these hypotheses: `example`; a path of at least six bodies, to see powers of E_φ that vanish on
+    a short path; a model with free hinges only, where H, Υ and compliances of several nodes are regular."""
     kinds = ["universal", "ball", "pin", "slider", "pin", "ball", "pin"]
     if "constant H" in hypotheses:
         kinds[0] = "free"

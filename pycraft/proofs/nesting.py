@@ -1,4 +1,4 @@
-"""What walks an expression in Python recurses, and says so where the expression is nested too deeply for that."""
+"""Walks through an expression in Python are recursive, and raise a clear error if it is nested too deeply."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _Call = TypeVar("_Call", bound=Callable[..., Any])
 
 
 def within_reach(what: str) -> Callable[[_Call], _Call]:
-    """A decorator: EvaluationError that names `what` where the interpreter's limit of recursion is reached."""
+    """Return a decorator that raises EvaluationError with the name `what` at the interpreter's recursion limit."""
 
     def decorated(call: _Call) -> _Call:
         @functools.wraps(call)
@@ -21,9 +21,9 @@ def within_reach(what: str) -> Callable[[_Call], _Call]:
                 return call(*args, **kwargs)
             except RecursionError:
                 raise _core.EvaluationError(
-                    f"{what}: the expression is nested too deeply (some hundred levels); take its parts one by one"
+                    f"{what}: the expression is nested too deeply (some hundred levels); treat its parts one by one"
                 ) from None
 
-        return guarded  # type: ignore[return-value]  # as the call that it wraps
+        return guarded  # type: ignore[return-value]  # the type of the wrapped call
 
     return decorated

@@ -1,7 +1,7 @@
-"""The normal form: which equations are read in which direction, and how a polynomial is brought there, step by step.
+"""The normal form: the rules, their directions, and the step-by-step reduction of a polynomial.
 
-A rule replaces a word by lighter or shorter ones (`weight`), so that every chain of rules ends. In each step one equation is applied
-wherever it fits, the one that stands first in the list before all others: hypotheses, what cancels, what makes words short, what opens
+A rule replaces a word by lighter or shorter ones (`weight`), so every reduction ends. Each step applies one equation
+wherever it fits, in order of rank: hypotheses, cancellations, rules that shorten words, definitions of
 abbreviations, then the recursions.
 """
 
@@ -23,15 +23,15 @@ from .words import FIRST, ONE, Alphabet, Number, Polynomial, Word, add_to, deriv
 WORDS, REWRITES = 2000, 12000
 """Sizes at which a reduction gives up; `generous` allows for more."""
 REMEMBERED = 50000
-"""How many words it is known of where a rule fits."""
+"""Number of words for which the first matching rule is cached."""
 _UNSEEN = 1 << 30
-"""No group's rank."""
+"""A rank beyond all groups."""
 _allowed: ContextVar[int] = ContextVar("allowed", default=1)
 
 
 @contextmanager
 def generous(times: int) -> Iterator[None]:
-    """Reductions of several times the size, inside the block."""
+    """Allow reductions of several times the size inside the block."""
     token = _allowed.set(times)
     try:
         yield
@@ -39,7 +39,7 @@ def generous(times: int) -> Iterator[None]:
         _allowed.reset(token)
 
 
-# (the word that goes, the equation), in order of rank. Transposes are rules as well.
+# (the replaced word, the equation), in order of rank. Transposes are rules as well.
 _CANCELLING = [(f"{x} {x}⁻¹", f"{x} {x}⁻¹ = I") for x in ("D", "M", "P", "R", "J", "Υ", "X")] + [("X⁻¹ X", "X⁻¹ X = I")]
 _RESOLVENTS = [
     ("φ E_φ", "φ E_φ = φ − I"),
@@ -109,9 +109,9 @@ _INVERSE_WEIGHTS = {"D": 0, "φ": 9, "ψ": 19}
 
 @cache
 def letter_weight(letter: str) -> int:
-    """What a letter weighs. Derivatives are heavy: the rules write them by Δ; so is what only the statement knows, a user's constant."""
+    """Return the weight of a letter. Derivatives are heavy, because the rules write them by Δ; so are a user's constants."""
     name = plain(letter)
-    if name.startswith(FIRST):  # of second derivatives those of first ones are made
+    if name.startswith(FIRST):  # second derivatives reduce to first ones
         return 40 if len(derivations(name)[0]) == 1 else 200
     if name[0] in _HEAVY:
         return _HEAVY[name[0]]
@@ -119,7 +119,7 @@ def letter_weight(letter: str) -> int:
 
 
 def weight(word: Word) -> tuple[int, int, Word]:
-    """The order that rules lower: weight, then length, then the letters."""
+    """Return the order that rules decrease: weight, then length, then the letters."""
     return sum(map(letter_weight, word)), len(word), word
 
 
@@ -132,7 +132,7 @@ def scaled(p: Polynomial) -> tuple[tuple, Number]:
 # ---------------------------------------------------------------------- rules
 @dataclass(frozen=True)
 class Rule:
-    """word → to, since word - to = factor⁻¹ (lhs - rhs) of the equation; `group` is its rank, which its transpose shares."""
+    """word → to, because word - to = factor⁻¹ (lhs - rhs) of the equation; `group` is its rank, which its transpose shares."""
 
     word: Word
     to: tuple[tuple[Word, Number], ...]
@@ -150,13 +150,13 @@ def rule_from(equation: Equation, word: Word, group: int) -> Rule:
 
 @dataclass
 class Budget:
-    """How many rewrites may still be spent; the same input spends the same."""
+    """Number of rewrites left; equal inputs spend equal numbers."""
 
     rewrites: int = field(default_factory=lambda: REWRITES * _allowed.get())
 
 
 class Rules:
-    """Rules by the first letter of the word that they replace, and by group: own ones, and those of `base`, which change no more."""
+    """Rules by the first letter of the replaced word, and by group: own rules, and the fixed rules of `base`."""
 
     def __init__(self, base: Rules | None = None):
         self._base = base
@@ -168,7 +168,7 @@ class Rules:
         self._places: dict[int, dict[Word, tuple[int, Rule] | None]] = {}
 
     def copy(self) -> Rules:
-        """Rules that may be added to; these must not be, from here on."""
+        """Return rules that can be extended; the original must not change from here on."""
         return Rules(self)
 
     def add(self, rule: Rule) -> None:
@@ -181,7 +181,7 @@ class Rules:
         self._places.pop(rule.group, None)
 
     def add_equation(self, equation: Equation, word: Word, alphabet: Alphabet, group: int) -> None:
-        """Its rule, and its transpose's where the two do not lead in a circle."""
+        """Add the rule of an equation, and of its transpose if the two together still end."""
         rule = rule_from(equation, word, group)
         self.add(rule)
         star = alphabet.star_word(word)
@@ -201,7 +201,7 @@ class Rules:
         return self._by_first if self._base is None else {**self._base._letters(), **self._by_first}
 
     def best(self, word: Word) -> int | None:
-        """The first group in rank that fits anywhere."""
+        """Return the first group in rank that fits anywhere."""
         found: int | None = self._best.get(word, _UNSEEN)
         if found == _UNSEEN:
             found = None if self._base is None else self._base.best(word)
@@ -214,11 +214,11 @@ class Rules:
         return found
 
     def of(self, rank: int) -> Rules:
-        """The rules among which those of a group are: groups of a statement's own are others than those of all."""
+        """Return the rules that contain a group: a statement's own rules, or the common ones."""
         return self if self._base is None or rank in self._groups else self._base.of(rank)
 
     def place(self, word: Word, rank: int) -> tuple[int, Rule] | None:
-        """(place, rule) of the group's rule that fits leftmost; of several there, the one that was added first."""
+        """Return (place, rule) of the group's leftmost match; of several rules there, the one that was added first."""
         places = self._places.setdefault(rank, {})
         if word in places:
             return places[word]
@@ -227,12 +227,12 @@ class Rules:
         return _remember(places, word, next(fitting, None))
 
     def reduce(self, p: Polynomial, alphabet: Alphabet, budget: Budget | None = None) -> tuple[Polynomial, list[Step]]:
-        """(the normal form, the steps that lead there).
+        """Return the normal form and the steps to it.
 
         Raises
         ------
         GaveUp
-            It grows beyond `WORDS` words, or takes more than the budget's rewrites.
+            The polynomial exceeds `WORDS` words, or the reduction exceeds the budget of rewrites.
         """
         budget = budget or Budget()
         steps: list[Step] = []
@@ -244,7 +244,7 @@ class Rules:
             p = steps[-1].after
 
     def reduce_both(self, p: Polynomial, q: Polynomial, alphabet: Alphabet) -> tuple[Polynomial, list[Step], Polynomial, list[Step]]:
-        """(p, its steps, q, its steps), reduced where the two differ, and equal if their normal forms are. Raises GaveUp."""
+        """Return (p, its steps, q, its steps), reduced where p and q differ; equal if their normal forms are equal. Raises GaveUp."""
         budget = Budget()
         sides = [p, q]
         steps: tuple[list[Step], list[Step]] = ([], [])
@@ -260,7 +260,7 @@ class Rules:
                     sides[i] = step.after
 
     def _apply(self, p: Polynomial, where: Container[Word], group: int, alphabet: Alphabet, budget: Budget) -> Step:
-        """One equation, at every place in these words."""
+        """Apply one equation at every place in these words."""
         done: Polynomial = {}
         uses: list[Use] = []
         rules = self.of(group)
@@ -299,7 +299,7 @@ def normal_form(p: Polynomial, rules: Rules, alphabet: Alphabet) -> Polynomial:
 # ---------------------------------------------------------------------- which rules
 @dataclass(frozen=True)
 class Setting:
-    """What decides on the rules: hypotheses, and which recursions the statement needs.
+    """Choice of the rules: hypotheses, and the recursions that the statement needs.
 
     With `composite`, φMφ* is written by R; with `compliance`, Ω by Υ and S, else S by Υ, which then is like any other letter; with
     `velocities`, a and b are written by Ṽ, V̄ and Ḣ, with the rules of `mechanics`.
@@ -312,7 +312,7 @@ class Setting:
 
 
 def chosen(setting: Setting) -> list[tuple[str, str]]:
-    """(word, equation) of a setting, by rank."""
+    """Return (word, equation) of a setting, by rank."""
     facts: list[tuple[str, str]] = [(letter, text) for letter, text in _vanishing(setting)]
     facts += [(word, text) for word, text in _CANCELLING if word != "J J⁻¹" or "J = 0" not in setting.hypotheses]
     facts += [*_RESOLVENTS, *_GAINS, *_OPENING, *mechanics.ABBREVIATIONS]
@@ -325,15 +325,15 @@ def chosen(setting: Setting) -> list[tuple[str, str]]:
 
 
 def _vanishing(setting: Setting) -> list[tuple[str, str]]:
-    """(letter, equation) of what is zero."""
+    """Return (letter, equation) of the letters that are zero."""
     return [("J", "J = 0")] * ("J = 0" in setting.hypotheses) + [("S", "S = 0")] * ("serial chain" in setting.hypotheses)
 
 
 @lru_cache(maxsize=64)
 def rules_for(setting: Setting, marks: tuple[str, ...] = ("",), locked: tuple[tuple[str, str], ...] = ()) -> Rules:
-    """The rules of a setting for the letters of one or more models. The result is shared: copy before adding.
+    """Return the rules of a setting for the letters of one or more models. The result is shared: copy before adding.
 
-    `locked` : (mark, that of its model) of the trees with hinges locked.
+    `locked` : (mark, the mark of its model) of the trees with locked hinges.
     """
     facts = theory()
     rules = Rules()
@@ -360,7 +360,7 @@ def _add_both(rules: Rules, equation: Equation, word: Word, facts: Theory, marks
 
 @cache
 def corollary(equation: Equation, word: Word, letter: str, zero: str) -> Equation:
-    """What an equation says where a letter is zero: H G = I, of H G = I − J D⁻¹. Itself where the letter does not occur."""
+    """Return an equation with a letter set to zero: H G = I from H G = I − J D⁻¹. The equation itself if the letter does not occur."""
     facts = theory()
     _, _, rest, sign = solved(equation, word)
     gone = [(w, c, w.index(letter)) for w, c in rest.items() if letter in w]
@@ -373,5 +373,5 @@ def corollary(equation: Equation, word: Word, letter: str, zero: str) -> Equatio
 
 
 def overlaps(first: Sequence[str], second: Sequence[str]) -> Iterable[int]:
-    """The lengths by which a word's end may lie over another's beginning."""
+    """Return the lengths by which a word's end may overlap another's beginning."""
     return (k for k in range(1, min(len(first), len(second))) if tuple(first[-k:]) == tuple(second[:k]))

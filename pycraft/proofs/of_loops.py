@@ -1,10 +1,10 @@
-"""Loops in proofs: rows by their ends, and compound bodies by the groups of bodies that they are made of.
+"""Loops in proofs: rows by their ends, and compound bodies by their groups of bodies.
 
-Embedded loops (₂) have the groups' own E and M. With θ̇ = X_r θ̇₂, X_r = [1; -Q_d⁻¹Q_r],
+Embedded loops (₂) have the E and M of the groups. With θ̇ = X_r θ̇₂, X_r = [1; -Q_d⁻¹Q_r],
 
     H₂ = X_r* H,   J₂ = X_r* J X_r,   a₂ = a + H* Ẋ_r θ̇₂,   Q X_r = 0,   Q Ẋ_r = -Q̇ X_r
 
-which is said of states on the loops, where alone these letters have numbers. Rows of loops of two ends are Q = A B* φ* H*.
+at states on the loops, the only states at which these letters have values. Rows of loops with two ends are Q = A B* φ* H*.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def of_rows(problem: Any) -> Iterator[Rule]:
 
 
 def of_embedded(problem: Any) -> Iterator[Rule]:
-    """Letters of embedded loops by those of the groups."""
+    """Yield rules for letters of embedded loops, in letters of the groups."""
     for mark, how, base in problem.relations:
         if how != "embedded loops":
             continue
@@ -47,7 +47,7 @@ def of_embedded(problem: Any) -> Iterator[Rule]:
 
 
 def _rows(problem: Any) -> Iterator[tuple[Any, Any, Word]]:
-    """(source, binding, the word that all rows are), of every Q in a statement."""
+    """Yield (source, binding, the word of all rows) for every Q in a statement."""
     letters = list(problem.alphabet.letters.items())
     for name, known in letters:
         e = known.expression

@@ -1,10 +1,10 @@
-"""Inverses as presuppositions: which of those that a proof uses are shown to exist, and which exist on no model at all.
+"""Inverses as presuppositions: which inverses of a proof are shown to exist, and which exist on no model.
 
-X⁻¹ may be used as XX⁻¹ = I = X⁻¹X; if X is singular these contradict each other and prove anything. So a proof names every X whose
-regularity it takes for granted. Regular are φ, ψ and D (the hinges are); X with a proved inverse, XZ = ZX = I; c I + a strictly triangular
-part; a sum of congruences A S A* with S ≥ 0 one of which is definite; a constant by its numbers. What remains is a presupposition of the
-statement: it is written beside the proof, and a proof whose presuppositions hold on none of the models that meet its hypotheses says
-nothing and is not given.
+X⁻¹ may be used as XX⁻¹ = I = X⁻¹X; if X is singular, these are contradictory and prove anything. So a proof names every X whose
+regularity it assumes. These are regular: φ, ψ and D (the hinges are); X with a proved inverse, XZ = ZX = I; c I + a strictly triangular
+part; a sum of congruences A S A* with S ≥ 0, one of them definite; a constant, by its values. The others are presuppositions of the
+statement: they are listed with the proof, and a proof whose presuppositions hold on no model that meets its hypotheses is
+void and is not returned.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _MASS_MATRIX, _WITH_J = parse("H φ M φ* H*"), parse("H φ M φ* H* + J")
 
 
 class Void(GaveUp):
-    """What is to be inverted is zero."""
+    """The operand of an inverse is zero."""
 
 
 # ---------------------------------------------------------------------- by structure
 def is_triangular(p: Polynomial, alphabet: Alphabet) -> bool:
-    """c I, c ≠ 0, and what leads from every body to others outboard of it alone, or inboard alone: φ and ψ are I and such a part."""
+    """Return True for c I, c ≠ 0, plus a part that leads from every body only outboard, or only inboard: φ and ψ are of this form."""
     for star in ("", "*"):
         unit, along = "unit" + star, {"step" + star, "down" + star}
         ways = {word: {moves(x, alphabet) for x in word} for word in p}
@@ -44,7 +44,7 @@ def is_triangular(p: Polynomial, alphabet: Alphabet) -> bool:
 
 
 def is_positive_definite(p: Polynomial, alphabet: Alphabet, hypotheses: Iterable[str] = (), definite: Iterable[str] = ()) -> bool:
-    """A sum of terms c A S A*, c > 0, S semidefinite, one of them definite, or ℳ + J among them."""
+    """Return True for a sum of terms c A S A*, c > 0, S semidefinite, with one definite term, or with ℳ + J among them."""
     signs = {word: _sign(word, alphabet, frozenset(definite)) for word in p}
     if any(c <= 0 or not signs[word] for word, c in p.items()):
         return False
@@ -54,7 +54,7 @@ def is_positive_definite(p: Polynomial, alphabet: Alphabet, hypotheses: Iterable
 
 
 def _sign(word: Word, alphabet: Alphabet, definite: frozenset[str]) -> str:
-    """definite, semidefinite, or nothing. What is definite is symmetric."""
+    """Return "definite", "semidefinite" or "". Definite operators are symmetric."""
     plainly = lambda w: tuple(x.replace("*", "¹" if inverted(x) else "") if split(x)[0] in definite else x for x in w)
     if plainly(word) != plainly(alphabet.star_word(word)):
         return ""
@@ -72,12 +72,12 @@ def _sign(word: Word, alphabet: Alphabet, definite: frozenset[str]) -> str:
 
 
 def is_regular_constant(e: Any) -> bool:
-    """Whether a user's constant has an inverse, by its numbers."""
+    """Return True if a user's constant has an inverse, by its values."""
     return _numbers(e) and e.shape[0] == e.shape[1] and not is_singular(np.asarray(e.dense()))
 
 
 def is_positive_constant(e: Any) -> bool:
-    """Whether a user's constant is symmetric and positive definite, by its numbers, with room for their rounding."""
+    """Return True if a user's constant is symmetric and positive definite, by its values, with a margin for rounding."""
     if not _numbers(e) or not e.is_symmetric:
         return False
     values = np.linalg.eigvalsh(np.asarray(e.dense()))
@@ -90,9 +90,9 @@ def _numbers(e: Any) -> bool:
 
 # ---------------------------------------------------------------------- of a proof
 def presupposed(used: Iterable[str], regular: Iterable[str], needs: dict[str, set[str]]) -> list[str]:
-    """The letters among those whose inverse is used that are not shown to be regular.
+    """Return the letters whose inverse is used and that are not shown to be regular.
 
-    `needs` says of letters that are regular where others are, which these are.
+    `needs` names, for letters whose regularity depends on others, these others.
     """
     shown, needed = {*regular}, {*used}
     while more := {name for name, others in needs.items() if name not in shown and others <= shown}:
@@ -101,14 +101,14 @@ def presupposed(used: Iterable[str], regular: Iterable[str], needs: dict[str, se
 
 
 def inverses_used(equations: Iterable[Equation]) -> set[str]:
-    """The letters whose inverses the equations use, with all that they rest on."""
+    """Return the letters whose inverses are used by the equations and all their premises."""
     return {split(word[0])[0] for e in foundations(equations) if e.kind == "inverse" for word in e.lhs} - {*ALWAYS}
 
 
 def nowhere(inverses: Sequence[str], roots: Sequence[str], alphabet: Alphabet, hypotheses: Sequence[str], contexts: Any, own: Any) -> str:
-    """The first of these letters whose inverse, or which as a root, exists on none of the models tried that meet the hypotheses.
+    """Return the first of these letters that, as an inverse or a root, exists on none of the tried models that meet the hypotheses.
 
-    Empty where each exists on one of them, or has no value on any.
+    Empty if each exists on some model, or has no value on any.
     """
     family = list(_family(alphabet, hypotheses, contexts, own)) if inverses or roots else []
     for name in (*inverses, *roots):
@@ -119,7 +119,7 @@ def nowhere(inverses: Sequence[str], roots: Sequence[str], alphabet: Alphabet, h
 
 
 def _family(alphabet: Alphabet, hypotheses: Sequence[str], contexts: Any, own: Any) -> Iterator[Values]:
-    """Letters at states of the model at hand, where it meets the hypotheses, and of trees that do."""
+    """Yield letters at states of the given model, if it meets the hypotheses, and of trees that do."""
     if own is not None and len(own.F) <= LARGEST and all(own._source.traits.get(h, True) for h in hypotheses):
         mine = contexts and contexts[0][0] is own._source
         yield Values(alphabet, own, None if own._model is None else own._model.random_state(1), contexts if mine else ())

@@ -1,4 +1,4 @@
-"""Proofs as they are read: numbered steps from one side to the other, what they rest on, and numbers beside them."""
+"""Proofs: numbered steps from one side to the other, the equations on which they rest, and residuals."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from .values import LARGEST, Values
 from .words import Alphabet, Polynomial, combine
 
 HYPOTHESES = ("J = 0", "serial chain", "single-DOF hinges", "constant H")
-"""Names of the hypotheses that a proof may have, as models' traits name them."""
+"""Names of the hypotheses that a proof may have, as in the traits of models."""
 
 COUNTED = "the coordinates of this model"
-"""The note of an equation that says how many coordinates one model has."""
+"""The note of an equation that uses one model's number of coordinates."""
 
 
 class Proof:
-    """What `prove` found: true as a condition if there is a derivation, all of whose steps were multiplied out once more.
+    """Result of `prove`: true as a condition if there is a derivation; all of its steps were multiplied out again.
 
     Attributes
     ----------
     statement : as text
     steps : numbered, from the left side to the right: `.before_text()`, `.after_text()`, the same in LaTeX, `.before` and `.after` as
         polynomials, `.reason` (the axiom or lemma), `.positions`, `.residual`
-    presupposes : inverses that the proof uses and that nothing here shows to exist; each exists on some model that meets the hypotheses
-    rests_on : every equation that it uses, with all that those use, premises first
-    unmet : hypotheses of the proof that the model at hand does not meet
-    note : why nothing was tried, if so
+    presupposes : inverses that the proof uses without proof of existence; each exists on some model that meets the hypotheses
+    rests_on : every equation that it uses, directly or indirectly, premises first
+    unmet : hypotheses of the proof that the given model does not meet
+    note : why no proof was attempted, if so
 
     Examples
     --------
@@ -76,7 +76,7 @@ class Proof:
     def of_statement(
         cls, read: Any, problem: Problem, spellings: Sequence[Spelling], steps: Sequence[Step], forms: Any, note: str = ""
     ) -> Proof:
-        """The proof of a statement that was read; none found if there are no steps."""
+        """Return the proof of a parsed statement; without steps, no proof was found."""
         statement, latex = (f"{getattr(read.lhs, how)()} = {getattr(read.rhs, how)()}" for how in ("text", "latex"))
         proof = cls(statement, latex, problem.alphabet, steps, forms, note=note)
         proof._opaque, proof._determinants = list(problem.opaque), sorted(problem.determinants)
@@ -100,7 +100,7 @@ class Proof:
         return self._found
 
     def recheck(self) -> bool:
-        """Whether every step, and every step of every lemma, follows from the equations that it names: exact, and nothing is searched."""
+        """Return True if every step, and every step of every lemma, follows from the equations that it names: exactly, without search."""
         if self._claim is not None:
             return self._claim.holds() and all(e.holds() for e in self.rests_on)
         if not self.steps:
@@ -122,22 +122,22 @@ class Proof:
 
     @property
     def axioms(self) -> list[str]:
-        """Texts of the axioms that it rests on, those of its lemmas included."""
+        """Texts of the axioms on which it rests, directly or through lemmas."""
         return list(dict.fromkeys(e.text for e in self.rests_on if e.kind == "axiom"))
 
     @property
     def lemmas(self) -> list[Proof]:
-        """The lemmas that the steps name, each with a proof of its own."""
+        """The lemmas cited by the steps, each with its own proof."""
         named = dict.fromkeys(e.root for step in self.steps for e in step.premises())
         return [Proof.of_lemma(e, self._alphabet) for e in named if e.kind in ("lemma", "structure")]
 
     def all_lemmas(self) -> list[Proof]:
-        """Those lemmas and the lemmas of their proofs, each before what cites it."""
+        """Return all lemmas, including lemmas of lemmas, each before the proofs that cite it."""
         return [Proof.of_lemma(e, self._alphabet) for e in self.rests_on if e.kind in ("lemma", "structure")]
 
     # ------------------------------------------------------------------ what it takes for granted
     def takes_for_granted(self, letters: Sequence[str], assumed: Sequence[tuple[Equation, str]] = ()) -> None:
-        """The inverses of these letters are presuppositions; those that the user assumes to exist are hypotheses."""
+        """Record the inverses of these letters as presuppositions, and as hypotheses if the user assumes that they exist."""
         self.presupposes = [self._inverse_text(name) for name in letters]
         given = [(equation, name) for equation, name in assumed if name]
         self._inverted = [*letters, *(name for _, name in given)]
@@ -145,12 +145,12 @@ class Proof:
             self.rests_on += [equation for equation, _ in given if equation not in self.rests_on]
 
     def _inverse_text(self, name: str) -> str:
-        """The inverse of a letter as it was typed."""
+        """Return the inverse of a letter as typed."""
         typed = next((o.expression.text() for o in self._opaque if o.name == name and o.kind == "inverse"), None)
         return f"{self._alphabet.letter_text(name)}⁻¹" if typed is None else f"({typed})⁻¹"
 
     def void_where(self, hypotheses: Sequence[str], operators: Any = None) -> str:
-        """Why the proof says nothing under these hypotheses: an inverse, a root or a ln|det| in it exists on no model tried. Else empty."""
+        """Return why the proof is void under these hypotheses: an inverse, root or ln|det| in it exists on no tried model. Else empty."""
         roots = [o.name for o in self._opaque if o.kind == "sqrt"]
         name = nowhere([*self._inverted, *self._determinants], roots, self._alphabet, hypotheses, self._contexts, operators)
         if not name:
@@ -158,31 +158,31 @@ class Proof:
         text = self._alphabet.letter_text(name)
         shown = self._inverse_text(name) if name in self._inverted else f"ln|det {text}|" if name in self._determinants else text
         where = f" where {' and '.join(hypotheses)}" if hypotheses else ""
-        return f"it takes {shown}, which exists on no model that was tried{where}"
+        return f"it uses {shown}, which exists on no model that was tried{where}"
 
     # ------------------------------------------------------------------ where the two sides stand
     @property
     def normal_forms(self) -> tuple[str, str]:
-        """Both sides as far as they were brought."""
+        """Normal forms of both sides."""
         return self._alphabet.text(self._forms[0]), self._alphabet.text(self._forms[1])
 
     @property
     def difference(self) -> str:
-        """What is left between the normal forms."""
+        """Difference of the normal forms."""
         return self._alphabet.text(combine((1, self._forms[0]), (-1, self._forms[1])))
 
     def search_counterexample(self, *, seed: int = 0, budget: float = 5.0) -> Any:
-        """The smallest model and state at which the statement is false, or None if none was found.
+        """Return the smallest model and state found at which the statement is false, or None.
 
         Parameters
         ----------
-        seed : of the models and states
+        seed : seed of the random models and states
         budget : CPU seconds
 
         Returns
         -------
         pycraft.identities.search.Counterexample or None
-            None also for derivatives, and for constants, which belong to their own model.
+            Always None for derivatives, and for constants, which belong to their own model.
         """
         from ..identities.search import named_vectors, smallest
         from ..identities.statement_text import statement_text
@@ -193,18 +193,18 @@ class Proof:
 
     # ------------------------------------------------------------------ numbers
     def verify(self, model: Any = None, seed: int = 0) -> float:
-        """Evaluate both sides of every step at a random state: a check of the proof, which decides nothing.
+        """Evaluate both sides of every step at a random state: a check of the proof, which does not depend on it.
 
         Parameters
         ----------
-        model : Multibody or OperatorSet; None for the one of the statement, or a small random one that meets the hypotheses
-        seed : of the state, and of the vectors that the steps are applied to
+        model : Multibody or OperatorSet; default: the statement's model, or a small random one that meets the hypotheses
+        seed : seed of the random state, and of the vectors to which the steps are applied
 
         Returns
         -------
         float
-            The worst residual, relative to the largest term of its step; every `step.residual` is set. Steps that use a hypothesis which
-            the model does not meet have large ones, and `unmet` names it.
+            The worst residual, relative to the largest term of its step; sets every `step.residual`. Steps with a hypothesis that
+            the model does not meet have large residuals, and `unmet` names the hypothesis.
 
         Raises
         ------
@@ -222,13 +222,13 @@ class Proof:
         return max(residuals, default=0.0)
 
     def verify_where_possible(self, operators: Any) -> None:
-        """Residuals at a random state of the model at hand; of an example where that is large, or fails a hypothesis."""
+        """Evaluate residuals at a random state of the given model, or of an example if the model is large or fails a hypothesis."""
         self._model = operators
         unmet = [] if operators is None else _unmet(self.hypotheses, operators)
-        if unmet and any(e.note == COUNTED for e in self.rests_on):  # a number that belongs to the model at hand
+        if unmet and any(e.note == COUNTED for e in self.rests_on):  # a value that belongs to the given model
             self.unmet = unmet
             return
-        if set(self.hypotheses) - {*HYPOTHESES}:  # no model is known that meets what was assumed
+        if set(self.hypotheses) - {*HYPOTHESES}:  # no model is known that meets the assumptions
             self.unmet = unmet
             return
         own = [] if operators is None or unmet or len(operators.F) > LARGEST else [operators]
@@ -242,7 +242,7 @@ class Proof:
 
     @property
     def worst(self) -> float | None:
-        """The worst residual of the steps that were evaluated; None if none was."""
+        """The worst residual of the evaluated steps; None if there are none."""
         return max((s.residual for s in self.steps if s.residual is not None), default=None)
 
     # ------------------------------------------------------------------ how it is shown
@@ -269,14 +269,14 @@ class Proof:
         return str(self)
 
     def latex(self) -> str:
-        """The chain of steps as an aligned display, or both normal forms."""
+        """Return the chain of steps as an aligned display, or both normal forms."""
         if not self:
             apart = in_lines(" \\ne ".join(self._alphabet.latex(p) for p in self._forms))
             return apart if not self.note else f"\\text{{{escaped(self.note)}}}"
         return aligned(self.steps)
 
     def full(self) -> FullProof:
-        """The proof with the derivations of all its lemmas, down to the axioms, numbered, each before what cites it.
+        """Return the proof with the derivations of all its lemmas, down to the axioms, numbered, each before its citations.
 
         It prints as text, as HTML in notebooks, and has `.latex()`.
         """

@@ -1,8 +1,8 @@
-"""`prove`: one side of a statement derived from the other, from what the operators are defined to be.
+"""`prove`: one side of a statement derived from the other, from the definitions of the operators.
 
 Both sides are brought to a normal form by rules that are axioms or proved from them (`axioms`), and one chain of steps leads from side to
-side: first without a hypothesis, then under those that may matter, fewest first. Every step is checked by multiplying it out
-(`equations`), whatever search found it. If the normal forms differ, no proof was found, and nothing is said about the statement.
+side: first without hypotheses, then under relevant hypotheses, fewest first. Every step is checked by multiplying it out
+(`equations`), independent of the search. If the normal forms differ, no proof was found, which does not refute the statement.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from .attempt import Attempt, Outcome
 from .axioms import theory
 from .cases import by_cases
 from .completion import complete
+from .definite import prove_inequality
 from .derivation import DerivativeProblem
 from .derivative import TIME, Formula, derivative
 from .equations import Equation, Step, joined, numbered, opened
@@ -51,31 +52,31 @@ def prove(
     Parameters
     ----------
     lhs, rhs : expressions of one model; or a statement as text and, in the second place, its model
-    model : Multibody or OperatorSet: what text is read on, and where the steps are evaluated. Text without a model is read on a small tree.
-    assume : what is taken for granted, as text: equations of operators ("G X = 0", "C = C*"), "X > 0" (symmetric and positive definite,
-        hence with an inverse), or hypotheses by name ("J = 0", "serial chain", ...). Those that the proof uses are among its hypotheses.
+    model : Multibody or OperatorSet on which text is read and steps are evaluated. Text without a model is read on a small tree.
+    assume : assumptions as text: equations of operators ("G X = 0", "C = C*"), "X > 0" (symmetric and positive definite,
+        hence with an inverse), or hypotheses by name ("J = 0", "serial chain", ...). The proof's hypotheses include the ones it uses.
         "J > 0 or J = 0" is proved case by case.
-    define : letters of one's own for the text, by name: expressions, text that reads as one, "Θ", "V" or "F" for a vector there, "Θ → V"
-        for an operator of which nothing is known. In the text itself they stand before the statement:
+    define : own letters for the text, by name: expressions, text of an expression, "Θ", "V" or "F" for a vector in that space, "Θ → V"
+        for an unknown operator. They may also be written in the text, before the statement:
         `x ∈ Θ; C : Θ → Θ; A := I + HφK; statement`.
-    dialect : the school in whose letters the text is written, see `pycraft.check`
+    dialect : notation of the text, see `pycraft.check`
 
     Returns
     -------
     Proof
-        True if a derivation was found: its steps, hypotheses, lemmas and residuals. Else false, with both normal forms: nothing is then
-        said about the statement; `pycraft.check` and `Proof.search_counterexample` look at it numerically.
+        True if a derivation was found, with its steps, hypotheses, lemmas and residuals. Otherwise false, with both normal forms; this does
+        not refute the statement: `pycraft.check` and `Proof.search_counterexample` examine it numerically.
 
     Raises
     ------
     ParseError, SpaceError
-        The text does not read as a statement; the sides do not act between the same spaces.
+        The text is not a statement; the sides do not act between the same spaces.
     EvaluationError
         There is only one side.
 
     Notes
     -----
-    Cost: milliseconds to a few tenths of a second, whatever the size of the model; no number decides anything.
+    Cost: milliseconds to a few tenths of a second, for any size of the model; no decision is numerical.
 
     Examples
     --------
@@ -100,12 +101,14 @@ def prove(
         read_on = reading(operators_of(model if model is not None else example()), define)
         read = read_on.statement(lhs)
         if read.rhs is None:
-            raise _core.EvaluationError(f"{lhs!r} has one side; a statement is lhs == rhs")
+            raise _core.EvaluationError(f"{lhs!r} has only one side; write lhs == rhs")
     else:
         read = Statement(*_sides(lhs, rhs), "", "expressions")
         read_on = reading(operators_of(model) if model is not None else _letters_of(read), define)
+    if read.relation != "=":
+        return by_cases(assume, lambda case: prove_inequality(read, model, assumptions(read_on, case)))
     proof = by_cases(assume, lambda case: _prove(read, model, assumptions(read_on, case), read_on.unknown))
-    if texts and not proof and not proof.note and _has_rates(read):  # a longer way, on which other rules meet
+    if texts and not proof and not proof.note and _has_rates(read):  # a longer route with other rules
         longer = reading(read_on.operators, define, written_out=True)
         again = longer.statement(lhs)
         found = by_cases(assume, lambda case: _prove(again, model, assumptions(longer, case), longer.unknown))
@@ -114,7 +117,7 @@ def prove(
 
 
 def _has_rates(read: Statement) -> bool:
-    """Whether derivatives are letters of a statement."""
+    """Return True if a statement has letters that are derivatives."""
     return any(isinstance(side, Formula) for side in (read.lhs, read.rhs))
 
 
@@ -131,12 +134,12 @@ def prove_derivative(expression: Any, rhs: Any, coordinate: int | str) -> Proof:
     Returns
     -------
     Proof
-        As from `prove`, with "constant H" and "single-DOF hinges" among its hypotheses where a step uses them.
+        As from `prove`, with the hypotheses "constant H" and "single-DOF hinges" if a step uses them.
 
     Raises
     ------
     ModelError
-        There is no such coordinate.
+        The coordinate does not exist.
 
     Examples
     --------
@@ -151,7 +154,7 @@ def prove_derivative(expression: Any, rhs: Any, coordinate: int | str) -> Proof:
 
 # ---------------------------------------------------------------------- reading
 def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
-    """Both sides with the spaces of each other; a 0 takes them too. Raises SpaceError where they differ."""
+    """Return both sides with common spaces, which a 0 takes from the other side. Raises SpaceError if they differ."""
     sides = [lhs, rhs]
     for i, other in ((0, rhs), (1, lhs)):
         domain = other.domain if is_operator(other) else None
@@ -161,7 +164,7 @@ def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
             sides[i] = sides[i] @ _core.identity(domain)
     if all(isinstance(s, _core.Operator) for s in sides):
         left, right = with_spaces(*sides)
-        left - right  # raises where the spaces differ
+        left - right  # raises if the spaces differ
         return sides[0], sides[1]
     spaces = [(s.domain, s.codomain) for s in sides if is_operator(s) and s.domain is not None]
     if len(spaces) == 2 and spaces[0] != spaces[1]:
@@ -170,7 +173,7 @@ def _sides(lhs: Any, rhs: Any) -> tuple[Any, Any]:
 
 
 def _one_identity(side: Any) -> Any:
-    """I for the I I that an I becomes when it is given its space."""
+    """Return I for the product I I, which arises when an I is given its space."""
     if isinstance(side, _core.Operator) and side.kind == "product" and all(f.kind == "identity" for f in side.children):
         return _core.identity(side.domain)
     return side
@@ -191,7 +194,7 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
     except Void as zero:
         return Proof.of_statement(read, problem, [], [], ({}, {}), str(zero))
     except GaveUp:
-        return Proof.of_statement(read, problem, [], [], ({}, {}), "it is too large: too many words, inverses or nodes")
+        return Proof.of_statement(read, problem, [], [], ({}, {}), "the statement is too large: too many words, inverses or nodes")
     p, q = problem.sides = [left.before, right.before]
     problem.numbers = not problem.scalars and all(
         space is not None and space.name == "R^1" for space in (read.lhs.domain, read.lhs.codomain)
@@ -218,14 +221,14 @@ def _prove(read: Statement, model: Any, assumed: Sequence[Assumption] = (), unkn
             void = void or impossible
             continue
         proof.verify_where_possible(own)
-        if model is None and read.reading != "expressions":  # there is no model at hand
+        if model is None and read.reading != "expressions":  # no model was given
             proof.unmet = []
         return proof
     return Proof.of_statement(read, problem, [left, right], [], nearest or (p, q), void)
 
 
 def _assumed(problem: DerivativeProblem, a: Assumption) -> tuple[Equation, str]:
-    """(the hypothesis, the letter that it says to be symmetric and regular, if it says that)."""
+    """Return the hypothesis, and the letter that it declares symmetric and regular, if any."""
     if not a.regular:
         return Equation("hypothesis", a.text, problem.words(a.lhs), problem.words(a.rhs), hypothesis=a.text), ""
     ((letter,),) = problem.words(a.lhs.inv())
@@ -234,7 +237,7 @@ def _assumed(problem: DerivativeProblem, a: Assumption) -> tuple[Equation, str]:
 
 
 def _impossible(problem: DerivativeProblem) -> str:
-    """What is assumed of letters of the table alone, and holds on no model that was tried; empty if all may hold."""
+    """Return an assumption on letters of the table that holds on no tried model; empty if all may hold."""
     table = theory().alphabet.letters
     for equation, _ in problem.assumed:
         words = [*equation.lhs, *equation.rhs]
@@ -243,7 +246,7 @@ def _impossible(problem: DerivativeProblem) -> str:
         step = Step(equation.lhs, equation.rhs, [], problem.alphabet)
         models = [m for h in ([], ["J = 0"], ["serial chain", "J = 0"], ["single-DOF hinges", "constant H"]) for m in examples(h)]
         if not any(_holds(step, problem, m) for m in models):
-            return f"{equation.text}, which is assumed, holds on no model that was tried"
+            return f"the assumption {equation.text} holds on no model that was tried"
     return ""
 
 
@@ -255,11 +258,11 @@ def _holds(step: Step, problem: DerivativeProblem, model: Any) -> bool:
 
 
 ASSUMED = 1e-9
-"""How far an assumption may be off on a model, relative to its terms, and count as met there: rounding of small models."""
+"""Relative error at which an assumption counts as met on a model: rounding of small models."""
 
 
 def _without_the_claim(steps: list[Step], claim: Polynomial, alphabet: Alphabet) -> list[Step]:
-    """The chain with every lemma that is the claim itself opened: a proof argues for it, and does not cite it."""
+    """Return the chain with every lemma equal to the claim expanded: a proof must not cite its claim."""
     said = [claim, alphabet.star_of(claim)]
     said += [combine((-1, p)) for p in said]
     made: list[Step] = []
@@ -270,17 +273,17 @@ def _without_the_claim(steps: list[Step], claim: Polynomial, alphabet: Alphabet)
 
 
 def _presupposed(attempt: Attempt, proof: Proof) -> list[str]:
-    """The letters whose inverses the statement or its proof takes for granted."""
+    """Return the letters whose inverses the statement or its proof presupposes."""
     stated = {split(x)[0] for p in attempt.problem.polynomials() for w in p for x in w if inverted(x)}
     return presupposed(stated | inverses_used(proof.rests_on), attempt.regular, attempt.needs)
 
 
 GENEROUS, AGAIN = 6, 2
-"""How much larger a reduction may grow in the end, and under how many of the settings that had given up."""
+"""Factor of the size of final reductions, and the number of settings, among those that gave up, that are tried again."""
 
 
 def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt | None, Outcome | Void]]:
-    """Attempts under more and more hypotheses; again, with completed rules; then with more room. The outcome of inverting zero is Void."""
+    """Yield attempts under more and more hypotheses; again with completed rules; then with larger limits. Inverting zero raises Void."""
     made: list[Attempt] = []
     given_up: list[tuple[Setting, list[tuple[Equation, Word]]]] = []
     for setting, extra in _settings(problem):
@@ -293,7 +296,7 @@ def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Itera
         except GaveUp:
             given_up.append((setting, extra))
             continue
-        if outcome.closed:  # fewer hypotheses may do, with more room
+        if outcome.closed:  # larger limits may need fewer hypotheses
             weaker = [tried for tried in given_up if tried[0].hypotheses < setting.hypotheses]
             yield from _again(problem, weaker, p, q)
             given_up = [tried for tried in given_up if tried not in weaker]
@@ -308,7 +311,7 @@ def _attempts(problem: DerivativeProblem, p: Polynomial, q: Polynomial) -> Itera
 
 
 def _again(problem: DerivativeProblem, settings: list[Any], p: Polynomial, q: Polynomial) -> Iterator[tuple[Attempt, Outcome]]:
-    """Attempts with more room."""
+    """Yield attempts with larger limits."""
     for setting, extra in settings[:AGAIN]:
         try:
             with generous(GENEROUS):
@@ -320,7 +323,7 @@ def _again(problem: DerivativeProblem, settings: list[Any], p: Polynomial, q: Po
 
 
 def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[Equation, Word]]]]:
-    """Settings by the number of hypotheses, with the rules that they add."""
+    """Yield settings by the number of hypotheses, with the rules that they add."""
     rules, constant = problem.derivative_rules()
     letters = {x for p in problem.polynomials() for word in p for x in word}
     names = {underived(plain(x)) for x in letters}
@@ -344,13 +347,13 @@ def _settings(problem: DerivativeProblem) -> Iterator[tuple[Setting, list[tuple[
 
 
 def _no_delta(problem: DerivativeProblem, name: str) -> tuple[Equation, Word]:
-    """HΔ = 0 where the axes at Δ's body are one: h*crf(h) = 0."""
+    """HΔ = 0 if Δ's body has a single axis: h*crf(h) = 0."""
     word = ("H", name)
     text = f"{problem.alphabet.word_text(word)} = 0"
     return Equation("hypothesis", text, {word: ONE}, {}, hypothesis="single-DOF hinges"), word
 
 
 def _letters_of(read: Statement) -> Any:
-    """The operators of the model that expressions are of."""
+    """Return the operators of the expressions' model."""
     sides = [side for side in (read.lhs, read.rhs) if is_operator(side)]
     return operators_of_sources(source for side in sides for source in side.sources) or example().soa

@@ -2,8 +2,8 @@
 
 Entries of the operators are rational in the sines and cosines of the angles. SymPy's own expressions would have to be simplified
 after every product to stay small; here a number is one fraction of two polynomials with whole coefficients, in lowest terms. Angles
-come in by t = tan(q/2): sin q = 2t/(1 + t²), cos q = (1 - t²)/(1 + t²) need no relation between them, so lowest terms are the
-shortest, and a fraction is zero only where its numerator is. What is shown has sines and cosines again. Relations remain for unit
+enter by t = tan(q/2): sin q = 2t/(1 + t²), cos q = (1 - t²)/(1 + t²) need no relation between them, so lowest terms are the
+shortest, and a fraction is zero only if its numerator is. Results are shown with sines and cosines again. Relations remain for unit
 quaternions, w² = 1 - x² - y² - z², and for roots, r² = n; they are applied after every operation.
 """
 
@@ -21,14 +21,14 @@ from .. import _core
 
 
 def exact(x: float | Fraction, simplest: bool = True) -> sympy.Expr:
-    """A Fraction as it is. A double as the fraction with a denominator up to 10⁶, or the root of one up to 1000, whose double it is; any
-    other as the binary fraction that it stands for.
+    """Return the exact value of a number: a Fraction unchanged; a double as the fraction with a denominator up to 10⁶, or the root of
+    one up to 1000, that rounds to it; any other as its binary fraction.
     """
     if isinstance(x, Fraction):
         return sympy.Rational(x.numerator, x.denominator)
     x = float(x)
     if not np.isfinite(x):
-        raise _core.ModelError(f"{x} has no exact form")
+        raise _core.ModelError(f"{x} has no exact form: give a finite number")
     if simplest:
         near = Fraction(x).limit_denominator(10**6)
         if float(near) == x:
@@ -45,8 +45,8 @@ class Rationals:
 
     Parameters
     ----------
-    expressions : every expression that entries are made of; what is not rational in them becomes a generator
-    unit : quaternions (w, x, y, z) taken as of unit length
+    expressions : all expressions in the entries; their non-rational parts become generators
+    unit : quaternions (w, x, y, z) of unit length
     """
 
     def __init__(self, expressions: Iterable[sympy.Expr], unit: Sequence[Sequence[sympy.Symbol]] = ()):
@@ -64,9 +64,9 @@ class Rationals:
         self.zero, self.one = self.field.zero, self.field.one
         self._gens = dict(zip(self.atoms, self.field.gens, strict=False))
         ring = self.field.ring
-        # index of a generator → what its square is, in the ring
+        # index of a generator → its square, in the ring
         self._squares: dict[int, Any] = {}
-        self._roots: dict[int, tuple[Any, Any]] = {}  # of a root's generator r: whole w and denominator d of the root r w/d
+        self._roots: dict[int, tuple[Any, Any]] = {}  # generator r of a root: whole w and denominator d of the root r w/d
         self._angles: dict[int, sympy.Expr] = {}
         for i, atom in enumerate(self.atoms):
             if isinstance(atom, sympy.tan):
@@ -81,7 +81,7 @@ class Rationals:
         for w, *u in self._unit:
             self._squares[self.atoms.index(w)] = 1 - sum(of_atom[x] ** 2 for x in u)
         self._shown: dict[tuple[Any, bool], sympy.Expr] = {}
-        # The same with sines and cosines: where elements are shown.
+        # The same field with sines and cosines, for display.
         cosines = [sympy.Dummy("c") for _ in self._angles]
         self._shown_ring = ring.clone(symbols=[*ring.symbols, *cosines])
         last = self._shown_ring.gens[len(ring.gens) :]
@@ -101,7 +101,7 @@ class Rationals:
         return p, whole
 
     def extended(self, expressions: Iterable[sympy.Expr]) -> Rationals:
-        """The field with more generators, itself where there is nothing new; `lift` brings elements there."""
+        """Return the field with more generators, or itself if none are new; `lift` converts elements."""
         atoms = dict.fromkeys(self.atoms)
         for expression in expressions:
             _collect(sympy.sympify(expression), atoms)
@@ -113,18 +113,18 @@ class Rationals:
         return made
 
     def lift(self, f: Any) -> Any:
-        """An element of a field that this one extends."""
+        """Convert an element of a field that this one extends."""
         more = len(self.field.gens) - len(f.field.gens)
         if not more and f.field == self.field:
             return f
-        if not self._names[: len(f.field.gens)] == list(f.field.symbols):  # the field of numbers alone has a generator of its own
+        if not self._names[: len(f.field.gens)] == list(f.field.symbols):  # the field of rationals has its own generator
             return self.field(int(f.numer.LC)) / self.field(int(f.denom.LC)) if f.numer else self.zero
         ring, pad = self.field.ring, (0,) * more
         numerator, denominator = (ring.from_dict({m + pad: c for m, c in p.items()}) for p in (f.numer, f.denom))
         return self.field.raw_new(numerator, denominator)
 
     def element(self, expression: Any) -> Any:
-        """The element that a SymPy expression in the field's atoms is."""
+        """Return the element of a SymPy expression in the field's atoms."""
         e = sympy.sympify(expression)
         if e.is_Rational:
             return self.field(int(e.p)) / self.field(int(e.q))
@@ -147,14 +147,14 @@ class Rationals:
             t = self._gens[sympy.tan(e.args[0] / 2)]
             over = 2 * t if not isinstance(e, sympy.cos) else 1 - t**2
             return over / (1 - t**2 if isinstance(e, sympy.tan) else 1 + t**2)
-        raise _core.EvaluationError(f"{e} is no rational function of {', '.join(map(str, self.atoms))}")
+        raise _core.EvaluationError(f"{e} is not a rational function of {', '.join(map(str, self.atoms))}")
 
     def reduce(self, f: Any) -> Any:
-        """The same element with squares replaced by the relations, in lowest terms. Raises EvaluationError where the denominator is 0."""
+        """Return the element with squares replaced by the relations, in lowest terms. Raises EvaluationError if the denominator is 0."""
         if not self._squares:
             return f
         numerator, denominator = _replace(f.numer, self._squares), _replace(f.denom, self._squares)
-        for i in self._roots:  # no root below the line: (a + br)(a - br) = a² - b²r²
+        for i in self._roots:  # no root in the denominator: (a + br)(a - br) = a² - b²r²
             if any(m[i] for m in denominator):
                 conjugate = self.field.ring.from_dict({m: -c if m[i] else c for m, c in denominator.items()})
                 if all(m[i] for m in denominator):
@@ -169,7 +169,7 @@ class Rationals:
         return self.field.new(numerator, denominator)
 
     def inner(self, pairs: Sequence[tuple[Any, Any]]) -> Any:
-        """Σ xy over the pairs: products of one denominator are added before a common factor is looked for."""
+        """Return Σ xy over the pairs: products with the same denominator are added before cancellation."""
         if len(pairs) == 1:
             x, y = pairs[0]
             return self.reduce(x * y)
@@ -185,9 +185,9 @@ class Rationals:
         return total
 
     def root(self, f: Any, sample: Mapping[sympy.Expr, float]) -> tuple[Rationals, Any]:
-        """√f in a field that has it, f positive at the sample: roots of the irreducible factors of what is shown.
+        """Return √f in a field that contains it, f positive at the sample: roots of the irreducible factors in sines and cosines.
 
-        Raises EvaluationError where f is negative at the sample.
+        Raises EvaluationError if f is negative at the sample.
         """
         numerator, denominator = (p.as_expr().xreplace(self._shown_atoms) for p in self._in_sines(f))
         if float(sympy.sympify(numerator / denominator).subs(sample)) < 0:
@@ -205,7 +205,7 @@ class Rationals:
 
     # ------------------------------------------------------------------ as SymPy shows it
     def expression(self, f: Any, simplify: bool = True) -> sympy.Expr:
-        """The element as a SymPy expression, shortest of the forms tried where `simplify` is set."""
+        """Return the element as a SymPy expression; with `simplify`, the shortest of several forms."""
         key = (f, simplify)
         if key not in self._shown:
             numerator, denominator = self._in_sines(f)
@@ -219,12 +219,12 @@ class Rationals:
         """Numerator and denominator as polynomials in sines and cosines, of degree at most one in every sine.
 
         Both are multiplied by cos^{2k}(q/2), 2k the degree in t = tan(q/2): t^j cos^{2k}(q/2) is a product of (1 ∓ cos q)/2, with one
-        sin q / 2 where j is odd.
+        sin q / 2 if j is odd.
         """
         ring = self._shown_ring
         pad = (0,) * len(self._angles)
         both: tuple[Any, Any] = (f.numer, f.denom)
-        for i, (whole, denominator) in self._roots.items():  # what is shown is the root r w/d
+        for i, (whole, denominator) in self._roots.items():  # the displayed root is r w/d
             if any(m[i] for p in both for m in p):
                 both = _spread(both[0], i, denominator, whole).cancel(_spread(both[1], i, denominator, whole))
         parts = [ring.from_dict({m + pad: c for m, c in p.items()}) for p in both]
@@ -267,13 +267,13 @@ class Rationals:
 
 
 def _burden(e: sympy.Expr) -> tuple[int, int, int]:
-    """What makes a form the longer one: operations, letters, minus signs that open a sum."""
+    """Return the length of a form: operations, letters, minus signs at the start of a sum."""
     text = str(e)
     return sympy.count_ops(e), len(text), text.count("(-")
 
 
 def _without_minus(e: sympy.Expr) -> sympy.Expr:
-    """A minus sign in front taken into a sum that is a factor."""
+    """Move a leading minus sign into a sum that is a factor."""
     number, rest = e.as_coeff_Mul()
     if number.is_negative:
         factors = list(sympy.Mul.make_args(rest))
@@ -286,7 +286,7 @@ def _without_minus(e: sympy.Expr) -> sympy.Expr:
 
 
 def _spread(p: Any, i: int, denominator: Any, whole: Any) -> Any:
-    """Times w, with r replaced by d times itself: r w/d goes to r, 1 to 1, up to the factor w of both parts of a fraction."""
+    """Multiply by w, with r replaced by d r: r w/d becomes r, 1 stays 1, up to the factor w of both parts of a fraction."""
     ring = p.ring
     made = ring.zero
     for with_root in (False, True):
@@ -300,7 +300,7 @@ def _degrees(p: Any) -> int:
 
 
 def _angle_sums(e: sympy.Expr) -> sympy.Expr:
-    """Products of sines and cosines gathered into those of sums of angles, where that makes it shorter."""
+    """Combine products of sines and cosines into sines and cosines of sums of angles, if that is shorter."""
     from sympy.simplify.fu import TR8, TR10i
 
     forms = [form for form in (TR10i(e), TR8(e)) if not form.has(sympy.pi)]
@@ -329,9 +329,9 @@ def _collect(e: sympy.Expr, atoms: dict[sympy.Expr, None]) -> None:
 
 
 def _root(e: sympy.Expr) -> sympy.Expr:
-    """A power of a rational as a multiple of a square root of a whole number."""
+    """Return a power of a rational as a multiple of a square root of a whole number."""
     if e.exp.q != 2:
-        raise _core.EvaluationError(f"{e} is no square root")
+        raise _core.EvaluationError(f"{e} is not a square root")
     whole, p, q = e.base ** ((e.exp.p - 1) // 2), e.base.p, e.base.q
     if p < 0:
         raise _core.EvaluationError(f"{e} is not real")
@@ -339,7 +339,7 @@ def _root(e: sympy.Expr) -> sympy.Expr:
 
 
 def _replace(p: Any, squares: Mapping[int, Any]) -> Any:
-    """The polynomial with x_i² replaced by squares[i], in every monomial as often as it goes."""
+    """Return the polynomial with x_i² replaced by squares[i], repeatedly in every monomial."""
     if not any(monomial[i] > 1 for monomial in p for i in squares):
         return p
     ring, made = p.ring, p.ring.zero

@@ -1,4 +1,4 @@
-"""Statements as text with letters of one's own: `x ∈ Θ; A := I + HφK; x*(MM + J)x = (A*x)*D A*x`, and what is assumed of them."""
+"""Statements as text with own letters: `x ∈ Θ; A := I + HφK; x*(MM + J)x = (A*x)*D A*x`, and assumptions on them."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from ..identities.parse import ParseError, Statement, Statements
 from .derivative import TIME, derivative
 from .lifting import lifted
 from .proof import HYPOTHESES
+from .rotors import GYRATING, rotors_of_any
 
 
 @dataclass
 class Assumption:
-    """What is assumed: an equation lhs = rhs; with `regular`, that lhs is symmetric and positive definite; or a hypothesis by name."""
+    """An assumption: an equation lhs = rhs; with `regular`, that lhs is symmetric and positive definite; or a hypothesis by name."""
 
     text: str
     lhs: Any = None
@@ -30,14 +31,14 @@ class Assumption:
 
 @dataclass
 class Reading:
-    """Text on the letters of one model, and one's own.
+    """Text in the letters of one model, and own letters.
 
     Attributes
     ----------
-    extra : one's own letters that are expressions, by their names
-    definitions : those that are text
-    unknown : names of operators of which nothing is known but their spaces
-    written_out : whether derivatives are worked out as they are read, and are no letters of their own
+    extra : own letters that are expressions, by name
+    definitions : own letters that are text
+    unknown : names of operators known only by their spaces
+    written_out : True if derivatives are computed while reading, instead of becoming letters
     """
 
     operators: Any
@@ -47,12 +48,12 @@ class Reading:
     written_out: bool = False
 
     def define(self, name: str, what: Any) -> None:
-        """A letter: an expression, or text: an expression, a space for a vector, "Θ → V" for an operator of which nothing more is known.
+        """Define a letter: an expression, or text: an expression, a space for a vector, "Θ → V" for an unknown operator.
 
         Raises
         ------
         ParseError
-            Text that is none of these; a name that is none.
+            The text is none of these; the name is invalid.
         """
         if isinstance(what, str):
             self._add([Definition(letter_name(name), what.strip(), f"{name} := {what}")])
@@ -62,17 +63,18 @@ class Reading:
     def _add(self, made: Sequence[Definition]) -> None:
         for d in made:
             self.definitions.append(d)
-            value = None if d.of_the_book else self._statements().letter(d.name, self.definitions)  # what does not read is said at once
-            if is_map(d):  # one operator, in the statement and in what is assumed
+            value = None if d.of_the_book else self._statements().letter(d.name, self.definitions)  # errors in the text appear at once
+            if is_map(d):  # one operator, in the statement and in the assumptions
                 self.extra[d.name] = value
                 self.definitions.pop()
                 self.unknown.add(d.name)
 
     def _statements(self, more: Mapping[str, Any] | None = None) -> Statements:
-        return Statements(self.operators, {**(more or {}), **self.extra}, derive=along if self.written_out else _formula)
+        known = {**rotors_of_any(self.operators), **(more or {}), **self.extra}
+        return Statements(self.operators, known, derive=along if self.written_out else _formula)
 
     def statement(self, text: str) -> Statement:
-        """The statement, with the definitions before and behind it. Raises ParseError."""
+        """Return the statement, with the definitions before and after it. Raises ParseError."""
         own = [*self.extra, *(d.name for d in self.definitions)]
         definitions, claim = divided(text, lambda said, more: is_by_block(said, own=[*own, *more]))
         self._add(definitions)
@@ -81,7 +83,7 @@ class Reading:
         return self.read(claim)
 
     def _of_operators(self, claim: str) -> str:
-        """A statement by block as the statement of operators that it is. Raises ParseError where it is none."""
+        """Return a statement by block as a statement of operators. Raises ParseError if there is none."""
 
         def kind(name: str) -> str:
             made = self._statements().letter(name, self.definitions)
@@ -92,43 +94,45 @@ class Reading:
         lift = lifted(read_by_block(claim, before=self.definitions), kind)
         if lift is None:
             raise ParseError(
-                f"{claim!r} is a statement by block that is none of operators: proved are those of every body k, its parent and children, "
-                "such as V(k) = φ*(℘(k),k)V(℘(k)) + H*(k)θ̇(k); pycraft.check evaluates it for every choice of bodies"
+                f"{claim!r} is a statement by block without a form in operators: prove takes statements for every body k, its parent and "
+                "children, such as V(k) = φ*(℘(k),k)V(℘(k)) + H*(k)θ̇(k); pycraft.check evaluates it for every choice of bodies"
             )
         return lift
 
     def read(self, text: str) -> Statement:
-        """Both sides. N stays the trace of I: what is proved is said of every model, so no model's number of coordinates may enter."""
+        """Read both sides. N remains the trace of I: a proof holds for every model, so no model's number of coordinates may enter."""
         try:
-            return self._statements({"N": _core.identity(self.operators.Theta).trace()}).read(text, self.definitions)
+            return self._statements({"N": _core.identity(self.operators.Theta).trace()}).read(text, self.definitions, inequalities=True)
         except ParseError as error:
             if re.search(r"\bN\b", text) and "N" not in {*self.extra, *(d.name for d in self.definitions)}:
                 raise ParseError(
-                    f"{error}\nN, the number of coordinates, differs from model to model: in a proof it stands beside scalars"
+                    f"{error}\nN, the number of coordinates, differs between models: in a proof, use it only with scalars"
                 ) from None
             raise
 
     def assumption(self, text: str) -> Assumption:
-        """An equation, "X > 0", or the name of a hypothesis. Raises ParseError."""
+        """Read an assumption: an equation, "X > 0", or the name of a hypothesis. Raises ParseError."""
         if text in HYPOTHESES:
             return Assumption(text)
         if (found := re.match(r"(.*?)(?:\s*>\s*0|\s+regular)$", text)) is not None:
             return Assumption(text, self.read(found[1]).lhs, regular=True)
         read = self.read(text)
         if read.rhs is None or not isinstance(read.lhs, _core.Operator):
-            raise ParseError(f"{text!r} is assumed: write an equation of operators, X > 0, or one of {', '.join(HYPOTHESES)}")
+            raise ParseError(f"assumption {text!r}: write an equation of operators, X > 0, or one of {', '.join(HYPOTHESES)}")
         return Assumption(text, read.lhs, read.rhs)
 
 
 def _formula(x: Any, direction: str, operators: Any) -> Any:
-    """∂x of what is proved of every model: a letter of which the product rule and ∂E_φ = E_φΔ_i speak; of a number, worked out."""
-    if isinstance(x, _core.Scalar):
+    """Return ∂x for a proof on every model: a letter for the product rule and ∂E_φ = E_φΔ_i; a scalar's derivative is computed."""
+    if direction == "t" and GYRATING in x.text():
+        raise ParseError("the rate of what rotors add, b_J and C_J, is not taken in proofs: pycraft.check evaluates it")
+    if isinstance(x, _core.Scalar) or direction not in (*COORDINATES, "t"):
         return along(x, direction, operators)
     return derivative(x, TIME if direction == "t" else coordinates_meant(operators)[COORDINATES.index(direction)])
 
 
 def reading(operators: Any, define: Mapping[str, Any] | None, written_out: bool = False) -> Reading:
-    """The letters of a model and one's own."""
+    """Return the letters of a model and own letters."""
     made = Reading(operators, written_out=written_out)
     for name, what in (define or {}).items():
         made.define(name, what)
@@ -136,5 +140,5 @@ def reading(operators: Any, define: Mapping[str, Any] | None, written_out: bool 
 
 
 def assumptions(made: Reading, texts: Iterable[str]) -> list[Assumption]:
-    """Everything assumed, read."""
+    """Return all assumptions, parsed."""
     return [made.assumption(text) for text in ([texts] if isinstance(texts, str) else texts)]

@@ -1,9 +1,9 @@
-"""Trees that were made of another: the same bodies with some hinges locked, cut at a hinge, and the same model in world axes.
+"""Trees derived from another: the same bodies with some hinges locked, cut at a hinge, and the same model in world axes.
 
-With hinges locked, E_φ and M are the model's own, and so is what is made of them alone. Cut at a hinge, E_φ has lost one block, and M, H
-and J are the model's own; a way leads over the cut once, and sweeps from the tips have not met it where they come to the body behind it. In
-world axes every letter is the model's between the frames' changes X = blockdiag φ(0,k): E_φ' = XE_φX⁻¹, H' = HX⁻¹, M' = XMX*, J' = J; and
-what the axioms determine from these follows them, since the axioms are the same equations again between X's.
+With locked hinges, E_φ and M are the model's own, and so are all letters built only from these. Cut at a hinge, E_φ lacks one block, and M,
+H and J are the model's own; a path crosses the cut at most once, and sweeps from the tips reach the body behind the cut before the cut. In
+world axes every letter is the model's, transformed by X = blockdiag φ(0,k): E_φ' = XE_φX⁻¹, H' = HX⁻¹, M' = XMX*, J' = J. The letters
+that the axioms determine from these transform alike, because the axioms keep their form.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .values import LARGEST
 from .words import FURTHER, Polynomial, Word, add_to, monomial, of_model, parse, plain, split
 
 _GIVEN = ("E_φ", "H", "M", "J")
-"""Letters that a tree is made of; the axioms determine the others."""
+"""Letters that define a tree; the axioms determine the others."""
 _FORCES = dict.fromkeys(["E_φ", "φ", "φ̃", "E_ψ", "ψ", "ψ̃", "τ", "τ̄"], (("X",), ("X⁻¹",)))
 _INERTIAS = dict.fromkeys(["M", "P", "P⁺", "R"], (("X",), ("X*",)))
 _COMPLIANCES = dict.fromkeys(["Υ", "Ω", "S"], (("X⁻*",), ("X⁻¹",)))
@@ -35,7 +35,7 @@ _FRAMES: dict[str, tuple[Word, Word]] = {
 
 
 def in_world(letter: str, mark: str, base: str) -> Equation | None:
-    """A letter of the tree in world axes by those of its model, P' = XPX*; None for one of another tree."""
+    """Return a letter of the tree in world axes in its model's letters, P' = XPX*; None for a letter of another tree."""
     name = plain(letter)
     if name not in _FRAMES or split(letter)[0] != name + mark:
         return None
@@ -44,12 +44,12 @@ def in_world(letter: str, mark: str, base: str) -> Equation | None:
     lhs, rhs = monomial(letter), monomial(*word)
     if own in _GIVEN:
         return Equation("definition", f"{letter} = {' '.join(word)}", lhs, rhs)
-    note = "the axioms of the letters in world axes are those of the model between X and X⁻¹, or X*"
+    note = "the axioms of the letters in world axes are the model's axioms between X and X⁻¹, or X*"
     return Equation("structure", f"{letter} = {' '.join(word)}", lhs, rhs, note=note, check=_axioms_are_carried)
 
 
 def _carried(word: Word) -> Word:
-    """A word in world axes by the model's letters."""
+    """Return a word in world axes in the model's letters."""
     done: list[str] = []
     for letter in word:
         name, mark = split(letter)
@@ -73,7 +73,7 @@ def _inverse(letter: str) -> str:
 
 @lru_cache(maxsize=1)
 def _axioms_are_carried() -> bool:
-    """Whether every axiom, carried to world axes, is that axiom between X's."""
+    """Return True if every axiom, transformed to world axes, is the same axiom between X's."""
     alphabet = theory().alphabet
     rules = rules_for(Setting(composite=True, compliance=True))
     for text in AXIOMS:
@@ -95,15 +95,15 @@ def _without_ends(word: Word) -> tuple[Word, Word, Word]:
 
 
 _CUT = [
-    ("φ₂ E_φ φ₂ = φ + φ₂ E_φ₂ φ₂ − φ₂", "a way from one part to the other leads over the cut, and over it once: φ = φ₂ + φ₂(E_φ − E_φ₂)φ₂"),
-    ("E_φ R₂ = E_φ R + E_φ₂ R₂ − E_φ₂ R", "R is summed from the tips: behind the cut it is the same, and E_φ − E_φ₂ is read there alone"),
-    ("E_φ P₂ = E_φ P + E_φ₂ P₂ − E_φ₂ P", "P is swept from the tips: behind the cut it is the same, and E_φ − E_φ₂ is read there alone"),
+    ("φ₂ E_φ φ₂ = φ + φ₂ E_φ₂ φ₂ − φ₂", "a path between the two parts crosses the cut exactly once: φ = φ₂ + φ₂(E_φ − E_φ₂)φ₂"),
+    ("E_φ R₂ = E_φ R + E_φ₂ R₂ − E_φ₂ R", "R is summed from the tips: behind the cut it is the same, and E_φ − E_φ₂ is read only there"),
+    ("E_φ P₂ = E_φ P + E_φ₂ P₂ − E_φ₂ P", "P is swept from the tips: behind the cut it is the same, and E_φ − E_φ₂ is read only there"),
 ]
-"""What is so of a tree (₂) that was made of another by leaving out one block of E_φ, and why."""
+"""Equations, with reasons, of a tree (₂) derived from another by removing one block of E_φ."""
 
 
 def of_a_cut(problem: Any) -> Iterator[tuple[Equation, Word]]:
-    """Letters of a tree that is cut at a hinge by those of its model: (equation, the word that it replaces)."""
+    """Yield rules for letters of a tree cut at a hinge, in its model's letters: (equation, the word that it replaces)."""
     for mark, how, base in problem.relations:
         if how != "cut tree":
             continue
@@ -119,7 +119,7 @@ def of_a_cut(problem: Any) -> Iterator[tuple[Equation, Word]]:
 
 
 def _of_two(text: str, mark: str, base: str) -> Polynomial:
-    """A sum of words, ₂ the mark of the cut tree's letters, as of these two trees."""
+    """Return a sum of words for two trees, where ₂ marks the letters of the cut tree."""
     found: Polynomial = {}
     sign = 1
     word: list[str] = []
@@ -133,15 +133,15 @@ def _of_two(text: str, mark: str, base: str) -> Polynomial:
 
 
 def _one_block_less(cut: Sequence[int], whole: Sequence[int]) -> bool:
-    """Whether a tree is the other but for one body at most, which has become a root."""
+    """Return True if a tree equals the other except for at most one body, which has become a root."""
     other = [c for c, w in zip(cut, whole, strict=True) if c != w]
     return not other or other == [-1]
 
 
 def at_the_roots(letter: str, e: Any, source: Any) -> Iterator[tuple[Equation, Word]]:
-    """What a constant whose numbers stand at bodies on the base alone does not see: (equation, word), c B φ* = c B for block diagonal B.
+    """Yield rules for constants that are zero except at bodies on the base: (equation, word), c B φ* = c B for block diagonal B.
 
-    A root has no parent: φ* leads from it to itself alone.
+    A root has no parent: φ* leads from it only to itself.
     """
     space = e.domain
     if source is None or space not in (source.F, source.V) or max(e.shape) > LARGEST:
@@ -154,7 +154,7 @@ def at_the_roots(letter: str, e: Any, source: Any) -> Iterator[tuple[Equation, W
         for x in ("φ*", "ψ*") if bool(B) == (space == source.F) else ():
             word, rest = (letter, *B, x), (letter, *B)
             text = f"{e.text()} {' '.join((*B, x))} = {' '.join((e.text(), *B))}"
-            note = f"{e.text()} is zero but at bodies on the base"
+            note = f"{e.text()} is zero except at bodies on the base"
             empty = functools.partial(_is_zero, X, inner)
             yield Equation("structure", text, monomial(*word), monomial(*rest), note=note, check=empty), word
 
@@ -164,7 +164,7 @@ def _is_zero(X: np.ndarray, columns: Sequence[slice]) -> bool:
 
 
 def compliance_facts(problem: Any, hypotheses: Iterable[str]) -> Iterator[tuple[Equation, Word]]:
-    """What the diagonal blocks of Ω give beside words: ΥG = H*D⁻¹ where J = 0, and B*ΩB = B*ΥB of nodes on one body."""
+    """Yield facts from the diagonal blocks of Ω: ΥG = H*D⁻¹ if J = 0, and B*ΩB = B*ΥB for nodes on one body."""
     letters = {x for p in problem.polynomials() for word in p for x in word}
     marks = [mark for mark in problem.marks if of_model("Υ", mark) in letters]
     for mark in marks if "J = 0" in hypotheses else ():
@@ -182,7 +182,7 @@ def compliance_facts(problem: Any, hypotheses: Iterable[str]) -> Iterator[tuple[
         inner = (star, of_model("Υ", mark), name)
         text = f"{known.text}* Ω {known.text} = {known.text}* Υ {known.text}"
         lemma = theory()("ψ* H* D⁻¹ H ψ = ψ* Υ + Υ ψ − Υ + ψ* S ψ")
-        note = "of one body's node only that body's block of Ω counts, and Υ = blockdiag(Ω)"
+        note = "for a node on one body only that body's block of Ω counts, and Υ = blockdiag(Ω)"
         yield Equation("structure", text, monomial(*whole), monomial(*inner), uses=[lemma], note=note, check=_blocks_of_compliance), whole
 
 
@@ -199,7 +199,7 @@ def _blocks_of_compliance() -> bool:
 
 
 def crosses_with_axes(problem: Any) -> Iterator[tuple[Equation, Word]]:
-    """h_i* crf(y) = −y* Δ_i, of a coordinate's axis h_i and a vector y: crossing changes sign with the order, and Δ_i = crf(h_i) there."""
+    """h_i* crf(y) = −y* Δ_i, for a coordinate's axis h_i and a vector y: the cross product is antisymmetric, and Δ_i = crf(h_i)."""
     letters = list(problem.alphabet.letters.items())
     symbols = [(name, x.expression) for name, x in letters if _is_of_kind("symbol", x.expression)]
     for name, known in letters:

@@ -1,7 +1,7 @@
 """`repair`: the true formulas nearest to a wrong one, one slip of the pen away, checked and then proved.
 
 Every change of one place (`edits`) is first evaluated on dense arrays at two states of small chains without J, where the book's formulas
-hold; what stays is derived (`prove`), and where no proof is found, or one that needs several hypotheses, looked at over the family of
+hold. The remaining candidates are proved (`prove`); if no proof is found, or one with several hypotheses, they are checked on the family of
 random trees (`truth`).
 """
 
@@ -30,21 +30,21 @@ from .prove import prove
 
 _SMALL = (Spec((-1, 0, 1), ("pin", "screw", "slider"), False, 5), Spec((-1, 0, 1), ("screw", "pin", "pin"), False, 6))
 _CLOSE = 1e-9
-"""Of dense double on a chain of three: far above its rounding, below what a change makes."""
+"""Tolerance of dense double precision on a chain of three: far above its rounding, below the effect of a change."""
 FEW = 1
-"""A proof with more hypotheses may have more than are needed: then it is looked where the formula is true."""
+"""A proof with more hypotheses may have too many; then the formula is checked numerically for the hypotheses it needs."""
 
 
 @dataclass
 class Repair:
-    """One formula near the typed one that is true.
+    """A true formula near the typed one.
 
     Attributes
     ----------
-    statement : the formula, as the book prints it
-    source : as text that reads in one way only
-    slip : what was done wrong, in words
-    where : the fewest hypotheses under which it is true, each set enough; [frozenset()] for none
+    statement : the formula in the book's notation
+    source : the formula as unambiguous text
+    slip : the mistake, in words
+    where : smallest sets of hypotheses under which it is true, each sufficient; [frozenset()] for none
     proof : its derivation, or None if none was found
     """
 
@@ -65,17 +65,17 @@ class Repair:
 
 @dataclass
 class Repairs:
-    """The true formulas nearest to a wrong one, the nearest first; empty where none was found. See `repair`."""
+    """True formulas nearest to a wrong one, nearest first; empty if none was found. See `repair`."""
 
     statement: str
     found: list[Repair] = field(default_factory=list)
     tried: int = 0
-    """Formulas one change away whose spaces fit."""
+    """Number of formulas one change away with matching spaces."""
     seconds: float = 0.0
     was_true: str = ""
-    """Where the typed formula itself is true, in words."""
+    """Hypotheses under which the typed formula itself is true, in words."""
     ended: str = ""
-    """What was left out when the budget ended the search; empty where nothing was."""
+    """Changes left untried when the budget ended the search; empty if none."""
 
     def __len__(self) -> int:
         return len(self.found)
@@ -106,25 +106,25 @@ class Repairs:
 
 
 def repair(statement: str, *, most: int = 3, budget: float = 5.0, dialect: str | None = None) -> Repairs:
-    """The true formulas nearest to a wrong one: one star, sign, tilde, letter, order, inverse, factor, number or term away.
+    """Return the true formulas nearest to a wrong one: one star, sign, tilde, letter, order, inverse, factor, number or term away.
 
     Parameters
     ----------
-    statement : as text; its spaces need not fit. Names are those of random trees: "body0", "hinge0", "node0", ...
-    most : formulas at most
-    dialect : the school in whose letters the statement is written, see `check`
-    budget : CPU seconds. Where they end the search, `.ended` and the printed result say what was left out.
+    statement : text; its spaces need not match. Names as in random trees: "body0", "hinge0", "node0", ...
+    most : largest number of formulas
+    dialect : notation of the statement, see `check`
+    budget : CPU seconds. If they end the search, `.ended` and the printed result name what was left untried.
 
     Returns
     -------
     Repairs
-        Ranked by how likely the slip is, then by how few hypotheses the formula needs; each with words, and with its proof where one was
+        Ranked by the likelihood of the slip, then by the number of hypotheses; each with an explanation, and with its proof if one was
         found.
 
     Raises
     ------
     ParseError
-        It is no statement: one side, or letters that are not there.
+        The text is not a statement: it has one side, or unknown letters.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0, dialect: str |
         found = _found(new, slip, spending, before)
         result.found += [] if found is None else [found]
     if left_out:
-        what = f"{left_out} formulas that hold on small chains were not looked at" if left_out > 0 else "not every change was tried"
+        what = f"{left_out} formulas that hold on small chains were not examined" if left_out > 0 else "not every change was tried"
         result.ended = f"the search ended after {budget:g} s of CPU time (budget={budget:g}): {what}"
     result.found.sort(key=lambda r: r.cost + 0.5 * len(r.where[0]))
     del result.found[most:]
@@ -169,7 +169,7 @@ def repair(statement: str, *, most: int = 3, budget: float = 5.0, dialect: str |
 
 
 def _is_close(formula: Formula, models: list[DenseLetters]) -> bool:
-    """Whether both sides fit and agree on small models."""
+    """Return True if both sides match and agree on small models."""
     try:
         return all(residual(formula, letters) < _CLOSE for letters in models)
     except Misfit:
@@ -177,7 +177,7 @@ def _is_close(formula: Formula, models: list[DenseLetters]) -> bool:
 
 
 def _found(formula: Formula, slip: Slip | None, spending: Budget, before: str = "") -> Repair | None:
-    """The formula with where it is true and its proof; None where it is not, or that is not known within the budget."""
+    """Return the formula with its hypotheses and proof; None if it is false, or undecided within the budget."""
     source = before + written_statement(formula)
     proof = _proof(source)
     where = [frozenset(proof.hypotheses)] if proof and {*proof.hypotheses} <= {*HYPOTHESES} else []
@@ -193,7 +193,7 @@ def _found(formula: Formula, slip: Slip | None, spending: Budget, before: str = 
 
 
 def nearest(formula: Formula, models: list[DenseLetters], spending: Budget | None = None) -> tuple[list[tuple[Formula, Slip]], int, bool]:
-    """(the formulas one change away that are true on these models, the likeliest slip first; how many had spaces that fit; whether all
+    """Return the formulas one change away that are true on these models, likeliest slip first; the number with matching spaces; True if all
     were tried before half of the budget was spent)."""
     near: list[tuple[Formula, Slip]] = []
     tried, whole = 0, True
@@ -212,7 +212,7 @@ def nearest(formula: Formula, models: list[DenseLetters], spending: Budget | Non
 
 
 def small_models(definitions: Sequence[Definition] = ()) -> list[DenseLetters]:
-    """The letters of two small chains without J, at states at which they move, and those of definitions."""
+    """Return the letters of two small chains without J, at moving states, and the letters of definitions."""
     return [_letters(spec, definitions) for spec in _SMALL]
 
 

@@ -11,14 +11,14 @@ from .words import ONE, Number, Polynomial, Word, framed, inverse_of, monomial, 
 
 
 class Roots:
-    """What is known of the square roots in a statement, added to its rules one after the other."""
+    """Known facts on the square roots in a statement, added to its rules one after another."""
 
     def __init__(self, local: LocalRules):
         self.local, self.problem, self.alphabet = local, local.problem, local.alphabet
         self._roots: list[tuple[Opaque, Polynomial, list[Step]]] = []
 
     def add(self, o: Opaque) -> None:
-        """LL* = A of L = A^½; L⁻¹A = L* where A is one word."""
+        """Add LL* = A of L = A^½, and L⁻¹A = L* if A is one word."""
         a, L = self.alphabet, o.name
         form, steps = self.local.reduce(o.inner)
         text = a.letters[L].text
@@ -61,7 +61,7 @@ class Roots:
         a = self.alphabet
         text = f"{a.letters[o.name].text} = {a.text({(other.name,): c})}"
         made = Equation(
-            "structure", text, {(o.name,): ONE}, {(other.name,): c}, note="a root of a positive multiple is that multiple's root"
+            "structure", text, {(o.name,): ONE}, {(other.name,): c}, note="the root of a positive multiple is a multiple of the root"
         )
         made.steps = [*steps, *its_steps]
         made.check = lambda: chain_holds(steps, o.inner, form) and chain_holds(its_steps, other.inner, its_form)

@@ -1,7 +1,7 @@
-"""Traces, ln|det| and norms in a normal form: the rules between numbers, and the steps by which they bring a number there.
+"""Normal form of traces, ln|det| and norms: the rules between numbers, and the steps of the reduction.
 
-What holds of operators holds inside a trace (`traces`); determinants are known by the structure of what they are of (`determinants`);
-factors of products are reduced one by one, and what is taken of equal operators is equal.
+Equations of operators hold inside a trace (`traces`); determinants follow from the structure of their operands (`determinants`);
+factors of products are reduced one by one, and scalars of equal operators are equal.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from .walk import GaveUp
 from .words import ONE, Number, Polynomial, Word, combine, factors_of, monomial, ratio
 
 STEPS = 200
-"""Steps at which a reduction gives up."""
+"""Number of steps at which a reduction gives up."""
 
 
 class ScalarRules:
-    """What brings numbers to a normal form: an attempt's rules inside traces; what is known of diagonal blocks and determinants."""
+    """Rules that bring scalars to a normal form: an attempt's rules inside traces, and facts on diagonal blocks and determinants."""
 
     def __init__(self, local: LocalRules, inverses: Inverses):
         self.local, self.problem, self.alphabet = local, local.problem, local.alphabet
@@ -34,7 +34,7 @@ class ScalarRules:
         self._reduced: dict[Word, tuple[Polynomial, list[Step]]] = {}
 
     def reduce(self, p: Polynomial) -> tuple[Polynomial, list[Step]]:
-        """(the normal form, the steps to it). Raises GaveUp."""
+        """Return the normal form and the steps to it. Raises GaveUp."""
         steps: list[Step] = []
         while (step := self._traces.turned(p) or self._traces.inside(p) or self._between(p) or self._factors_reduced(p)) is not None:
             steps.append(step)
@@ -44,7 +44,7 @@ class ScalarRules:
         return p, steps
 
     def _factors_reduced(self, p: Polynomial) -> Step | None:
-        """One factor of products by its normal form, wherever it stands; a reciprocal by that of what it is of."""
+        """Replace one factor of products by its normal form everywhere; a reciprocal by its operand's normal form."""
         for factor in sorted({f for word in p if word[0] in ("×", "1/") for f in factors_of(word)}):
             inverse = factor[0] == "1/"
             inner = factor[1:] if inverse else factor
@@ -92,7 +92,7 @@ class ScalarRules:
             yield from self._same("norm", word[1])
 
     def _same(self, kind: str, name: str) -> Iterator[Equation]:
-        """The number of an operand by that of an earlier one that is equal to it, up to the sign or the star."""
+        """Replace the scalar of an operand by the scalar of an earlier, equal operand, up to the sign or the star."""
         a = self.alphabet
         inner: Polynomial = next((o.inner for o in self.problem.opaque if o.name == name), {(name,): ONE})
         form, steps = self.local.reduce(inner)
@@ -115,6 +115,6 @@ class ScalarRules:
 
 
 def _factor_holds(factor: Word, inner: Word, by: Polynomial, form: Polynomial, steps: Sequence[Step]) -> bool:
-    """Whether a factor is what it is said to be: its steps lead there; of a reciprocal, those of what it is of."""
+    """Return True if a factor equals its claimed form by its steps; for a reciprocal, by its operand's steps."""
     wanted = form if factor == inner else reciprocal_of(form)
     return by == wanted and chain_holds(steps, {inner: ONE}, form)

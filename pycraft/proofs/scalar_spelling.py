@@ -13,7 +13,7 @@ from .words import NUMBER, ONE, Polynomial, combine, monomial, ratio
 
 
 class ScalarSpelling(Spelling):
-    """The step from a scalar expression as it was typed to words."""
+    """The step from a scalar expression as typed to words."""
 
     def holds(self) -> bool:
         return scalar_words(self.problem, self.expression) == self.before
@@ -23,7 +23,7 @@ class ScalarSpelling(Spelling):
 
 
 def expand(problem: Problem, e: Any) -> ScalarSpelling:
-    """A scalar expression in words, as the step that says so. Raises GaveUp."""
+    """Return a scalar expression in words, with the step that states it. Raises GaveUp."""
     problem._used = []
     p = scalar_words(problem, e)
     return ScalarSpelling(problem, e, p, list(dict.fromkeys(problem._used)))
@@ -56,7 +56,7 @@ def scalar_words(problem: Problem, e: Any) -> Polynomial:
 
 
 def _log_determinant(problem: Problem, e: Any) -> Polynomial:
-    """ln|det| of products by their factors, of inverses and transposes by what they are of."""
+    """Return ln|det| of products by their factors, of inverses and transposes by their operands."""
     match e.kind:
         case "identity":
             return {}

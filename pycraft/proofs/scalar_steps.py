@@ -1,4 +1,4 @@
-"""Steps between numbers, and the equations that they use: what holds of operators inside a trace, and facts about numbers."""
+"""Steps between scalars, and the equations that they use: equations of operators inside a trace, and facts on scalars."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .words import NUMBER, ONE, Alphabet, Polynomial, Word, add_to, combine
 
 @dataclass
 class TraceUse(Use):
-    """c tr(left (lhs - rhs) right) of one equation; `space` is that of what the factors lead to."""
+    """c tr(left (lhs - rhs) right) of one equation; `space` is the space of the product's values."""
 
     space: str = ""
 
@@ -70,7 +70,7 @@ def fact(
     steps: Sequence[Step] = (),
     uses: Sequence[Equation] = (),
 ) -> Equation:
-    """The equation that says what number a word is, with what checks it."""
+    """Return the equation that gives the value of a word, with its check."""
     text = f"{alphabet.word_text(word)} = {alphabet.text(by)}"
     made = Equation("structure", text, {word: ONE}, by, steps=list(steps), uses=list(uses), note=note)
     made.check = check

@@ -18,7 +18,7 @@ _SPACES_OF = {s.name: (s.domain, s.codomain) for s in _core.symbols} | {"S": ("F
 
 
 def trace_word(word: Word, alphabet: Alphabet, space: str) -> Word:
-    """tr(word), by the first of its rotations and those of its transpose; tr I by its space."""
+    """Return tr(word), by the first of its rotations and its transpose's rotations; tr I by its space."""
     if not word:
         return ("tr", f"I[{min(space, _DUALS.get(space, space))}]")
     return ("tr", *min(rotations(word, alphabet)))
@@ -60,7 +60,7 @@ def reciprocal_of(p: Polynomial) -> Polynomial | None:
 
 
 def space_of(word: Word, alphabet: Alphabet) -> str:
-    """The space that a word's values lie in."""
+    """Return the space of a word's values."""
     name, mark = split(word[0])
     known = alphabet.letters[underived(name)]
     if known.word:
@@ -74,6 +74,6 @@ def space_of(word: Word, alphabet: Alphabet) -> str:
 
 
 def rotations(word: Word, alphabet: Alphabet) -> Iterator[Word]:
-    """The words whose trace is that of this one: its rotations, and those of its transpose."""
+    """Return the words with the same trace: the rotations of this word and of its transpose."""
     for w in (word, alphabet.star_word(word)):
         yield from (w[i:] + w[:i] for i in range(len(w)))

@@ -1,4 +1,4 @@
-"""Proofs as text, HTML and LaTeX: a chain of steps with its reasons, and with the derivations of all lemmas unfolded."""
+"""Proofs as text, HTML and LaTeX: a chain of steps with reasons, optionally with the derivations of all lemmas."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .equations import Step
 
 
 class Shown(Protocol):
-    """What is shown of a proof; it is true as a condition where there is one."""
+    """Display of a proof; true as a condition if there is a proof."""
 
     statement: str
     steps: list[Step]
@@ -40,11 +40,11 @@ class Shown(Protocol):
 
 
 ASIDE = 76
-"""Characters of a step and its reason that a display sets side by side."""
+"""Largest number of characters of a step and its reason that a display sets side by side."""
 GUTTER = 3
-"""Columns between a step and its reason, at least."""
+"""Least number of columns between a step and its reason."""
 GAP = "\\boxed{\\;?\\;}"
-"""What stands for a line left out."""
+"""Placeholder of a line left out."""
 _STYLE = (
     "<style>.pycraft-proof{font-family:serif;max-width:60em}.pycraft-proof ol{margin:.2em 0 .8em;padding-left:2.5em}"
     ".pycraft-proof li{display:list-item;overflow-wrap:anywhere}.pycraft-proof .reason{opacity:.7;margin-left:1.5em;font-size:.9em}</style>"
@@ -52,8 +52,8 @@ _STYLE = (
 
 
 def lines(steps: Sequence[Step], cited: dict[str, int] | None = None) -> list[str]:
-    """The chain, one step a line of 80 columns, reasons in a column, or below what leaves no room for them; with the numbers of the lemmas
-    that are cited, where these are given."""
+    """Return the chain, one step per line of 80 columns, with reasons in a column, or below long lines; with the numbers of the cited
+    lemmas, if these are given."""
     if not steps:
         return []
     made = [wrapped(f"      {steps[0].before_text()}")]
@@ -67,12 +67,12 @@ def lines(steps: Sequence[Step], cited: dict[str, int] | None = None) -> list[st
 
 
 def fitted(text: str) -> str:
-    """The text with the lines broken that do not fit a terminal."""
+    """Return the text with long lines broken to fit a terminal."""
     return "\n".join(wrapped(line) if cell_len(line) > WIDTH else line for line in text.split("\n"))
 
 
 def reason(step: Step, cited: dict[str, int] | None = None) -> str:
-    """The equations of a step, each with the number of the lemma that it is."""
+    """Return the equations of a step, each with its lemma's number."""
     if not cited or step.title or not step.uses:
         return step.reason
     found = step.reason
@@ -83,7 +83,7 @@ def reason(step: Step, cited: dict[str, int] | None = None) -> str:
 
 
 def reason_latex(step: Step, cited: dict[str, int] | None = None) -> str:
-    """The equations of a step as mathematics, with the numbers of the lemmas that are cited."""
+    """Return the equations of a step as mathematics, with the numbers of the cited lemmas."""
     if step.title or not step.uses:
         return f"\\text{{{escaped(step.reason)}}}"
     latex = step.alphabet.latex
@@ -95,7 +95,7 @@ def reason_latex(step: Step, cited: dict[str, int] | None = None) -> str:
 
 
 def aligned(steps: Sequence[Step], cited: dict[str, int] | None = None, blanks: Collection[int] = ()) -> str:
-    """The chain as an aligned display, a box for the lines left out; reasons beside the lines, or below them where a page is too narrow."""
+    """Return the chain as an aligned display, with a box for lines left out, and reasons beside the lines, or below on a narrow page."""
     if not steps:
         return "\\begin{aligned}\\end{aligned}"
     beside = max(len(s.after_text()) for s in steps) + max(len(s.reason) for s in steps) <= ASIDE
@@ -108,13 +108,13 @@ def aligned(steps: Sequence[Step], cited: dict[str, int] | None = None, blanks: 
 
 
 def _set_in(sign: str, latex: str) -> list[str]:
-    """The rows of an aligned display that a line takes, with the sign before it."""
+    """Return the rows of an aligned display for a line, with the sign before it."""
     first, *others = lines_of(latex)
     return [f"{sign}& {first}", *(f"& \\quad {other}" for other in others)]
 
 
 class FullProof:
-    """A proof with the derivations of its lemmas, each numbered and before what cites it, down to the axioms. See `Proof.full`."""
+    """A proof with the derivations of its lemmas, numbered, each before its citations, down to the axioms. See `Proof.full`."""
 
     def __init__(self, proof: Shown):
         self.proof = proof
@@ -122,7 +122,7 @@ class FullProof:
         self._numbers = {lemma.statement: i for i, lemma in enumerate(self.lemmas, 1)}
 
     def __len__(self) -> int:
-        """How many steps there are in all."""
+        """Return the total number of steps."""
         return sum(len(p.steps) for p in (*self.lemmas, self.proof))
 
     def __str__(self) -> str:
@@ -141,7 +141,7 @@ class FullProof:
         return f'{_STYLE}<div class="pycraft-proof">{"".join(parts)}{_section(self.proof, None, self._numbers)}</div>'
 
     def latex(self) -> str:
-        """Sections of aligned displays, one a lemma."""
+        """Return sections of aligned displays, one per lemma."""
         made = []
         for p in (*self.lemmas, self.proof):
             number = self._numbers.get(p.statement)
@@ -151,7 +151,7 @@ class FullProof:
 
 
 def where(proof: Shown) -> str:
-    """The hypotheses, as the end of a sentence."""
+    """Return the hypotheses as the end of a sentence."""
     return f", where {' and '.join(proof.hypotheses)}" if proof.hypotheses else ""
 
 
@@ -160,12 +160,12 @@ def _where_latex(proof: Shown) -> str:
 
 
 def page(proof: Shown) -> str:
-    """A proof alone, as HTML; its steps wrap."""
+    """Return a single proof as HTML; its steps wrap."""
     return f'{_STYLE}<div class="pycraft-proof">{_section(proof, None, {})}</div>'
 
 
 def _section(proof: Shown, number: int | None, cited: dict[str, int]) -> str:
-    """One proof: verdict, statement and hypotheses, and its steps as a list."""
+    """Return one proof: verdict, statement and hypotheses, and its steps as a list."""
     label = f"({number}) " if number is not None else ""
     hypotheses = f"where {' and '.join(proof.hypotheses)}" if proof.hypotheses else "no hypothesis"
     said = verdict_html("proved", f"proved, {hypotheses}" if number is None else hypotheses) if proof else verdict_html("no proof found")

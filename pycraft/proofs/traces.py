@@ -1,4 +1,4 @@
-"""Traces: what holds of operators holds inside one, at any rotation of its word or of its transpose's.
+"""Traces: equations of operators hold inside a trace, at any rotation of its word or of its transpose.
 
 tr X = tr blockdiag(X),    tr(blockdiag(X) B) = tr(X B) for B block diagonal,    tr(Υ B) = tr(Ω B).
 """
@@ -19,11 +19,11 @@ from .words import NUMBER, ONE, Alphabet, Polynomial, Word, add_to, monomial, of
 
 
 class Traces:
-    """An attempt's rules inside traces, and what is known of a trace by its diagonal blocks alone."""
+    """An attempt's rules inside traces, and facts on a trace from its diagonal blocks."""
 
     def __init__(self, local: LocalRules):
         self.local, self.problem, self.alphabet = local, local.problem, local.alphabet
-        # X⁻* = X⁻¹, by X⁻*: inside a trace, which is that of its transpose, no rule for one of the two would end
+        # X⁻* = X⁻¹, by X⁻*: a trace equals its transpose's, so a rule for one of the two would never end
         self._symmetric = {
             letter: e
             for e in local.equations
@@ -32,7 +32,7 @@ class Traces:
         }
 
     def turned(self, p: Polynomial) -> Step | None:
-        """Each trace by the first of its rotations and its transpose's in which symmetric inverses are written without a star."""
+        """Write each trace by the first rotation of its word or its transpose with symmetric inverses without a star."""
         a, after, uses = self.alphabet, dict(p), []
         for word in [w for w in p if w[0] == "tr" and any(x in self._symmetric or a.star(x) in self._symmetric for x in w[1:])]:
             best, turned = min((tuple(a.star(x) if x in self._symmetric else x for x in w), w) for w in rotations(word[1:], self.alphabet))
@@ -48,7 +48,7 @@ class Traces:
         return ScalarStep(p, after, list(uses), a) if uses or after != p else None
 
     def inside(self, p: Polynomial) -> Step | None:
-        """One equation of operators, in every trace where it fits."""
+        """Apply one equation of operators in every trace where it fits."""
         fitting = {word: found for word in p if word[0] == "tr" and (found := min(self._places(word), key=lambda f: f[0], default=None))}
         if not fitting:
             return None
@@ -65,7 +65,7 @@ class Traces:
         return ScalarStep(p, after, uses, self.alphabet)
 
     def _places(self, word: Word) -> Iterator[tuple[int, Word, Rule, Word]]:
-        """(rank, left, rule, right) of what fits in a rotation of tr(word) or of its transpose."""
+        """Yield (rank, left, rule, right) of rules that fit a rotation of tr(word) or of its transpose."""
         if word[1].startswith("I["):
             return
         for turned in rotations(word[1:], self.alphabet):
@@ -77,11 +77,11 @@ class Traces:
 
     # ------------------------------------------------------------------ equations between numbers
     def equations(self, word: Word) -> Iterator[Equation]:
-        """What is known of this trace."""
+        """Yield the known facts on this trace."""
         return self._dimension(word) if word[1].startswith("I[") else self._diagonal(word)
 
     def _dimension(self, word: Word) -> Iterator[Equation]:
-        """tr I is the number of coordinates, where the statement is one of a model."""
+        """tr I is the number of coordinates, if the statement belongs to one model."""
         source = self.problem.contexts[0][0] if self.problem.of_one_model and self.problem.contexts else None
         space = getattr(source, {"Θ": "Theta", "F": "F"}.get(word[1][2:-1], ""), None)
         if space is not None:
@@ -93,7 +93,7 @@ class Traces:
             value = diagonal_blocks(w, a)
             if value != {w: ONE} and not any(a.letters[split(x)[0]].word for v in value for x in v):
                 by = trace_of(value, a, space_of(w, a))
-                note = "only diagonal blocks count, and the letters say which there are"
+                note = "only diagonal blocks count, and the shapes of the letters determine them"
                 yield fact(a, word, by, note, functools.partial(_has_diagonal, w, value, a))
         for w in rotations(word[1:], self.alphabet):
             name, mark = split(w[0])

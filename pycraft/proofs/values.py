@@ -1,7 +1,7 @@
-"""Numbers for words: both sides of a step at a random state of a model, applied to a few random vectors.
+"""Values of words: both sides of a step at a random state of a model, applied to a few random vectors.
 
-This checks proofs and decides none. A letter's value is the model's operator of that name, or the letter's own expression carried over to
-that model; what is applied is what was typed, no theorem used.
+This checks proofs and decides nothing. A letter's value is the model's operator of that name, or the letter's own expression transferred to
+that model, applied as typed, without theorems.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ PROBES = 3
 SINGULAR = 1e-13
 """Ratio of the smallest singular value to the largest below which an operator of a small model of ordinary bodies counts as singular."""
 LARGEST = 600
-"""Entries of a body vector up to which steps are checked without being asked."""
+"""Largest size of a body vector for which steps are checked automatically."""
 
 
 class NoValue(ArithmeticError):
@@ -38,9 +38,9 @@ class Values:
     Parameters
     ----------
     operators : the model's operator set
-    state : of `model.random_state`, or None for the present one
-    contexts : (source, binding) of the letters' models where these letters are the model's own; none where they are carried over
-    seed : of the random vectors
+    state : a state of `model.random_state`, or None for the present one
+    contexts : (source, binding) of the letters' models if the letters are the model's own; empty if they are transferred
+    seed : seed of the random vectors
     """
 
     def __init__(self, alphabet: Alphabet, operators: Any, state: Any = None, contexts: Sequence[tuple[Any, Any]] = (), seed: int = 0):
@@ -54,7 +54,7 @@ class Values:
 
     # ------------------------------------------------------------------ letters
     def letter(self, letter: str) -> np.ndarray:
-        """The value of a letter with its marks. Raises NoValue."""
+        """Return the value of a letter with its marks. Raises NoValue."""
         if letter not in self._values:
             name, mark = split(letter)
             value = self._base(name) if not mark else self.letter(name)
@@ -80,7 +80,7 @@ class Values:
             raise NoValue(f"{known.text} has no value on this model: {error}") from None
 
     def _expression(self, name: str) -> Any:
-        """The expression that a letter stands for, on this model."""
+        """Return the expression of a letter on this model."""
         o, known = self.operators, self.alphabet.letters[name]
         if known.expression is not None:
             return known.expression if self._contexts else transferred(known.expression, o)
@@ -114,7 +114,7 @@ class Values:
         return np.asarray(e._bound(self._binding).dense(rules=False))
 
     def _derivative(self, name: str) -> np.ndarray:
-        """∂X along the coordinates, or time, that its marks stand for, by the core's rules."""
+        """Return ∂X along the coordinates, or time, of its marks, by the core's rules."""
         marks, inner = derivations(name)
         e = self._expression(inner)
         for mark in reversed(marks):
@@ -126,14 +126,14 @@ class Values:
         return np.asarray(e._bound(self._binding).dense())
 
     def dimension(self, space: str) -> int:
-        """Of a space that every model has. Raises NoValue."""
+        """Return the dimension of a space that every model has. Raises NoValue."""
         if space not in ("Θ", "V", "F"):
             raise NoValue(f"a space {space} belongs to its own model")
         return _space_named(space, self.operators).dimension
 
     # ------------------------------------------------------------------ words
     def word(self, word: Word) -> np.ndarray:
-        """A word applied to the random vectors of its domain."""
+        """Return a word applied to the random vectors of its domain."""
         if word not in self._products:
             head = self.letter(word[0])
             self._products[word] = head @ (self.word(word[1:]) if len(word) > 1 else self._probe(head.shape[1]))
@@ -145,7 +145,7 @@ class Values:
         return self._probes[n]
 
     def residual(self, step: Step) -> float:
-        """|before - after| relative to the largest term of either side, or product of two factors in one. Raises NoValue."""
+        """Return |before - after| relative to the largest term of either side, or partial product in a term. Raises NoValue."""
         before, after = step.full()
         if any(word and word[0] in NUMBERS for word in [*before, *after]):
             return self._between_numbers(before, after)
@@ -161,7 +161,7 @@ class Values:
         return _largest(total) / largest if largest else 0.0
 
     def _between_numbers(self, before: Polynomial, after: Polynomial) -> float:
-        """As `residual`, of polynomials in traces, determinants and norms."""
+        """Return `residual` for polynomials in traces, determinants and norms."""
         total, largest = 0.0, 0.0
         for sign, p in ((1.0, before), (-1.0, after)):
             for word, c in p.items():
@@ -170,14 +170,14 @@ class Values:
         return abs(total) / largest if largest else 0.0
 
     def _number(self, word: Word) -> tuple[float, float]:
-        """(the number that a word stands for, the size of what is added up in it)."""
+        """Return the value of a word, and the size of the terms summed in it."""
         kind, *letters = word
         if kind == "×":
             parts = [self._number(w) for w in factors_of(word)]
             return math.prod(x for x, _ in parts), math.prod(size for _, size in parts)
         if kind == "1/":
             if letters[0].startswith("⟨"):
-                raise NoValue(f"1/({letters[0][1:-1]}) is no word")
+                raise NoValue(f"1/({letters[0][1:-1]}) is not a word")
             value, _ = self._number(tuple(letters))
             return 1 / value, 1 / abs(value)
         if kind in ("1", "ln") or letters[0].startswith("I["):
@@ -194,7 +194,7 @@ class Values:
 
 
 def _parts(e: Any) -> list[Any]:
-    """An expression and all below it."""
+    """Yield an expression and all its parts."""
     seen = [e]
     for x in seen:
         seen += [c for c in x.children if c not in seen]
@@ -202,7 +202,7 @@ def _parts(e: Any) -> list[Any]:
 
 
 def is_singular(X: np.ndarray) -> bool:
-    """Whether a matrix of ordinary numbers has no inverse: its smallest singular value is rounding beside its largest."""
+    """Return True if a matrix of ordinary values is singular: its smallest singular value is rounding relative to its largest."""
     values = np.linalg.svd(X, compute_uv=False) if np.isfinite(X).all() else np.zeros(1)
     return values.size > 0 and not values[-1] > SINGULAR * values[0]
 
@@ -212,12 +212,12 @@ def _largest(x: Any) -> float:
 
 
 def transferred(e: Any, operators: Any) -> Any:
-    """The same expression on another model.
+    """Return the same expression on another model.
 
     Raises
     ------
     NoValue
-        It holds a constant or something external, which belongs to its own model's spaces.
+        The expression holds a constant or an external operator, which belongs to its own model's spaces.
     """
     return carried_out(_transferred(e, operators))
 
@@ -230,7 +230,7 @@ def _transferred(e: Any, operators: Any) -> Walk:
         case "symbol":
             _, name, arguments, _ = symbol_parts(e)
             source = operators._source
-            if name == "Delta":  # any coordinate will do
+            if name == "Delta":  # any coordinate suffices
                 return source.symbol(name, coordinate=min(arguments[1], operators.Theta.dimension - 1))
             return source.symbol(name, nodes=list(arguments[1:]))
         case "vector":
@@ -246,7 +246,7 @@ def _transferred(e: Any, operators: Any) -> Walk:
 
 
 def rebuilt(e: Any, children: Sequence[Any]) -> Any:
-    """The same node over other children; None for what is not made of them alone."""
+    """Return the same node with other children; None for a node with other data."""
     match e.kind:
         case "sum":
             return functools.reduce(operator.add, children)

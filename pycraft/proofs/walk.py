@@ -1,4 +1,4 @@
-"""Walks through expressions of any depth: generators that yield a walk for each part and are sent what it comes to."""
+"""Walks through expressions of any depth: generators that yield a walk for each part and are sent its result."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Generator
 from typing import Any
 
 NODES = 200_000
-"""Nodes at which a walk gives up: an expression may share its parts, and is then larger than it looks."""
+"""Number of nodes at which a walk gives up: an expression with shared parts is larger than it looks."""
 Walk = Generator[Any, Any, Any]
 
 
@@ -15,7 +15,7 @@ class GaveUp(Exception):
 
 
 def carried_out(walk: Walk) -> Any:
-    """What a walk comes to. Raises GaveUp beyond `NODES` parts."""
+    """Return the result of a walk. Raises GaveUp beyond `NODES` parts."""
     stack, sent, taken = [walk], None, 0
     while stack:
         try:

@@ -1,6 +1,6 @@
 """Words: products of letters; and sums of words with exact coefficients, the ring in which proofs are written.
 
-A letter is a string: a name, then what is done to it: "φ", "φ*", "D⁻¹", "φ⁻*". A word is a tuple of letters, the empty one is I. A
+A letter is a string: a name and marks: "φ", "φ*", "D⁻¹", "φ⁻*". A word is a tuple of letters, the empty one is I. A
 polynomial maps words to fractions; the zero operator is the empty polynomial. Products do not commute.
 """
 
@@ -24,9 +24,9 @@ ONE = 1
 FURTHER = "₂₃₄₅₆₇₈₉"
 """Marks of the letters of a second model, a third, ..., in one statement."""
 SHARED = ("E_φ", "φ", "φ̃", "M", "R")
-"""Letters that do not depend on which hinges move: of a tree with some locked they are those of its model."""
+"""Letters that do not depend on which hinges move: a tree with locked hinges shares them with its model."""
 SAME_EDGES = ("hinge subset", "embedded loops")
-"""How trees are made that share these letters: with hinges locked, and with loops embedded in groups of bodies."""
+"""Kinds of derived trees that share these letters: with locked hinges, and with loops embedded in groups of bodies."""
 NUMBERS = ("tr", "ln det", "norm", "ln", "1", "×", "1/")
 """First letters of words that stand for numbers: see `scalars`."""
 NUMBER: Word = ("1",)
@@ -43,7 +43,7 @@ def ratio(a: Number, b: Number) -> Number:
 
 
 def root_of(c: Number) -> Number | None:
-    """√c where it is a fraction, else None."""
+    """Return √c if it is a fraction, else None."""
     above, below = Fraction(c).numerator, Fraction(c).denominator
     if above <= 0:
         return None
@@ -52,7 +52,7 @@ def root_of(c: Number) -> Number | None:
 
 
 def add_to(p: Polynomial, word: Word, c: Number) -> None:
-    """p += c word, in place; what becomes zero is dropped."""
+    """Add c word to p in place; zero terms are dropped."""
     total = p.get(word, 0) + c
     if total:
         p[word] = total
@@ -90,7 +90,7 @@ def framed(left: Word, p: Polynomial, right: Word) -> Polynomial:
 
 # ---------------------------------------------------------------------- numbers
 def factors_of(word: Word) -> list[Word]:
-    """The numbers that a product of numbers is made of; of a number alone itself, of 1 none."""
+    """Return the factors of a product of numbers: a single number itself, none for 1."""
     if word == NUMBER:
         return []
     if word[0] != "×":
@@ -106,11 +106,11 @@ def factors_of(word: Word) -> list[Word]:
 
 # ---------------------------------------------------------------------- derivatives
 FIRST, SECOND = "∂", "∂ⱼ"
-"""Marks of letters that are derivatives: along what a statement differentiates along first, and along what second; ∂ⱼ∂X is one of ∂X."""
+"""Marks of derivatives: along a statement's first and second direction; ∂ⱼ∂X is a derivative of ∂X."""
 
 
 def derivations(name: str) -> tuple[list[str], str]:
-    """(the marks of derivatives, outermost first; the letter that they are of)."""
+    """Return the marks of derivatives, outermost first, and the differentiated letter."""
     marks = []
     while name.startswith(FIRST):
         marks.append(SECOND if name.startswith(SECOND) else FIRST)
@@ -119,22 +119,22 @@ def derivations(name: str) -> tuple[list[str], str]:
 
 
 def underived(name: str) -> str:
-    """The letter that a derivative is of; of any other itself."""
+    """Return the letter differentiated in a derivative; any other letter itself."""
     return derivations(name)[1]
 
 
 # ---------------------------------------------------------------------- letters
 @dataclass(frozen=True)
 class Letter:
-    """What a name stands for.
+    """Meaning of a name.
 
     Attributes
     ----------
-    text, latex : how it is shown
-    symmetric : whether it is its own transpose
-    expression : the pycraft expression, where one is known; `ascii` names it in the operator set of any model
+    text, latex : display forms
+    symmetric : True if it is its own transpose
+    expression : the pycraft expression, if known; `ascii` names it in the operator set of any model
     shape : "diagonal" by bodies, "down" (strictly, towards the children), "unit" (down, with I on the diagonal), "siblings", or "full"
-    word : of a letter that stands for the diagonal blocks of a word
+    word : for a letter of the diagonal blocks of a word, that word
     """
 
     name: str
@@ -190,35 +190,35 @@ def inverse_of(letter: str) -> str:
 
 @cache
 def plain(letter: str) -> str:
-    """The name of a letter as the first model has it."""
+    """Return the name of a letter in the first model."""
     return split(letter)[0].rstrip(FURTHER)
 
 
 @cache
 def of_model(letter: str, mark: str) -> str:
-    """The letter of a further model, given that of the first."""
+    """Return the letter of a further model, given the first model's."""
     name, done = split(letter)
     return name + mark + done
 
 
 def inverted(letter: str) -> bool:
-    """Whether the letter is an inverse."""
+    """Return True if the letter is an inverse."""
     return split(letter)[1] in ("⁻¹", "⁻*")
 
 
 class Alphabet:
-    """The letters of one problem: those of the table, and what a statement adds."""
+    """The letters of one problem: letters of the table, and letters that a statement adds."""
 
     def __init__(self, letters: Mapping[str, Letter] | None = None):
         self.letters: dict[str, Letter] = dict(_sko() if letters is None else letters)
         self._stars: dict[str, str] = {}
-        self.along: dict[str, Any] = {}  # by the mark of a derivative, the coordinate or "t" that it is along
+        self.along: dict[str, Any] = {}  # the coordinate or "t" of a derivative, by its mark
 
     def add(self, letter: Letter) -> None:
         self.letters[letter.name] = letter
 
     def star(self, letter: str) -> str:
-        """X* of X: X itself where X is symmetric."""
+        """Return X* of X: X itself if X is symmetric."""
         found = self._stars.get(letter)
         if found is None:
             name, mark = split(letter)
@@ -271,7 +271,7 @@ class Alphabet:
         return " ".join(map(self.letter_latex, word)) or "I"
 
     def _number_shown(self, word: Word, shown: Callable[[str], str], trace: str, determinant: str, norm: str, logarithm: str) -> str:
-        """A word that stands for a number: see `scalars`."""
+        """Return the display of a word that stands for a number: see `scalars`."""
         kind, *letters = word
         if kind == "1":
             return "1"
@@ -287,7 +287,7 @@ class Alphabet:
         return {"tr": trace, "ln det": determinant, "norm": norm}[kind].format(inside)
 
     def text(self, p: Polynomial) -> str:
-        """As the book prints it."""
+        """Return the polynomial in the book's notation."""
         return _sum(((c, self.word_text(w)) for w, c in p.items()), "−", " ")
 
     def latex(self, p: Polynomial) -> str:
@@ -312,7 +312,7 @@ def _sum(terms: Iterable[tuple[Number, str]], minus: str, space: str) -> str:
 
 
 def number(c: Number) -> str:
-    """A coefficient: exactly, or as the shortest decimal that names its double."""
+    """Return a coefficient exactly, or as the shortest decimal of its double."""
     if c.denominator == 1:
         return str(c.numerator)
     if c.denominator <= 64:
@@ -322,7 +322,7 @@ def number(c: Number) -> str:
 
 # ---------------------------------------------------------------------- reading
 def parse(text: str) -> Polynomial:
-    """A sum of words whose letters stand apart: "φ K H ψ − 2 φ + I"."""
+    """Parse a sum of words with separated letters: "φ K H ψ − 2 φ + I"."""
     p: Polynomial = {}
     word: list[str] = []
     c: Number = ONE
@@ -343,6 +343,6 @@ def parse(text: str) -> Polynomial:
 
 
 def parse_equation(text: str) -> tuple[Polynomial, Polynomial]:
-    """Both sides of "lhs = rhs"."""
+    """Parse both sides of "lhs = rhs"."""
     left, right = text.split(" = ")
     return parse(left), parse(right)

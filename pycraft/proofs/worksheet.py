@@ -1,8 +1,8 @@
-"""Worksheets: a class set of exercises as notebooks, one of its own for every student, with an answer key and grading by proof.
+"""Worksheets: a class set of exercises as notebooks, a different one for every student, with an answer key and grading by proof.
 
-A worksheet's notebook holds derivations with gaps and cells of answers; what is asked stands in its metadata, the solutions do not.
-Grading reads the answers back, runs nothing of the notebook, and has each judged as `Exercise.answer` judges it: by proof, so that another
-road to the same line counts.
+A worksheet's notebook holds derivations with gaps and cells of answers; its metadata holds the questions, but not the solutions.
+Grading reads the answers back without running the notebook, and judges each as `Exercise.answer` does: by proof, so that another
+way to the same line counts.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ TOPICS = {
     "inverse": ["ℳ⁻¹ = [I-HψK]*D⁻¹[I-HψK]", "[I+HφK]⁻¹ = I - HψK", "φ*H*ℳ⁻¹ = ψ*H*D⁻¹[I-HψK]"],
     "operational space": ["Ω = φ*H*ℳ⁻¹Hφ", "(I-ΩM)φ* = ψ* - ΩP"],
 }
-"""Topics of worksheets: statements of the book that have a proof of several lines."""
+"""Topics of worksheets: statements of the book with proofs of several lines."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Worksheet:
         title = f"# {self.topic[:1].upper()}{self.topic[1:]}\n\n{'Answer key' if solved else 'Worksheet'} of {self.student}."
         text = "" if solved else (
             "\n\nFill in the lines that are left out: text in Unicode, ASCII or LaTeX, as in `\"HψPH* + HPψ*H* - D\"`. "
-            "The last cell judges what is there so far, by proof; another road to the same line counts."
+            "The last cell judges the answers so far, by proof; another way to the same line counts."
         )  # fmt: skip
         cells = [_cell("markdown", title + text)]
         for k, question in enumerate(self.questions, 1):
@@ -113,7 +113,7 @@ class Worksheet:
 
 @dataclass(repr=False)
 class Worksheets:
-    """The worksheets of a class, see `worksheet`. It prints as who has which questions, and which lines are left out."""
+    """The worksheets of a class, see `worksheet`. It prints each student's questions, and the lines left out."""
 
     topic: str
     sheets: list[Worksheet]
@@ -135,13 +135,13 @@ class Worksheets:
         return "\n".join(map(wrapped, lines))
 
     def save(self, folder: str | Path, pdf: bool = False) -> list[Path]:
-        """Write `<student>.ipynb` for every student and `key/<student>.ipynb` with the solutions; with `pdf`, each as PDF too.
+        """Write `<student>.ipynb` for every student and `key/<student>.ipynb` with the solutions; with `pdf`, each also as PDF.
 
         Raises
         ------
         ModelError
-            The folder cannot be written; for PDF, nbconvert (extra [lab]) or what it needs is missing: the text says what. The
-            notebooks are written all the same.
+            The folder cannot be written; for PDF, nbconvert (extra [lab]) or a program that it needs is missing, named in the message. The
+            notebooks are written nevertheless.
         """
         folder = Path(folder)
         written = []
@@ -156,7 +156,7 @@ class Worksheets:
         return written + [to_pdf(path) for path in written] if pdf else written
 
     def grade(self, folder: str | Path) -> list[Grade]:
-        """Judge what was handed in: `<student>.ipynb` in a folder, of every student of the class; a missing one has no points."""
+        """Judge the submitted `<student>.ipynb` of every student of the class in a folder; a missing one gets no points."""
         grades = []
         for sheet in self.sheets:
             path = Path(folder) / f"{sheet.student}.ipynb"
@@ -167,26 +167,26 @@ class Worksheets:
 def worksheet(
     topic: str | Sequence[str], students: int | Sequence[str] = 30, seed: int = 0, *, questions: int = 3, blanks: int = 2
 ) -> Worksheets:
-    """A worksheet of its own for every student of a class.
+    """Return a different worksheet for every student of a class.
 
     Parameters
     ----------
     topic : "resolvents", "composite bodies", "projections", "factorization", "inverse", "operational space"; or statements or names of
         theorems of your own choice
-    students : how many, or their names; notebooks are called by them
-    seed : of the choice of statements, their order and the lines left out
-    questions : derivations on each sheet, at most as many as the topic has
-    blanks : lines left out of each, at most as many as say something new
+    students : their number, or their names, which name the notebooks
+    seed : seed of the choice of statements, their order and the lines left out
+    questions : derivations per sheet, at most the number of the topic's statements
+    blanks : lines left out of each derivation, at most the number of its informative lines
 
     Returns
     -------
     Worksheets
-        `.save(folder, pdf=False)` writes notebooks and answer keys, `.grade(folder)` judges what comes back.
+        `.save(folder, pdf=False)` writes notebooks and answer keys, `.grade(folder)` judges the submissions.
 
     Raises
     ------
     EvaluationError
-        No such topic; a statement that has no proof; no students or questions.
+        An unknown topic; a statement without a proof; no students or questions.
 
     Examples
     --------
@@ -200,9 +200,9 @@ def worksheet(
     statements = TOPICS[topic] if isinstance(topic, str) else list(topic)
     names = _names(students)
     if not statements or not names or questions < 1 or blanks < 1:
-        raise _core.EvaluationError("a worksheet takes one statement, student, question and blank or more")
+        raise _core.EvaluationError("a worksheet needs at least one statement, one student, one question and one blank")
     if len(set(names)) < len(names) or any(not n or Path(n).name != n for n in names):
-        raise _core.EvaluationError("students have names of their own that can be names of files")
+        raise _core.EvaluationError("students need different names that are valid file names")
     gaps = {statement: _gaps(exercise(statement)) for statement in statements}
     sheets = []
     for k, name in enumerate(names):
@@ -218,18 +218,18 @@ def _names(students: int | Sequence[str]) -> list[str]:
     if isinstance(students, Integral) and not isinstance(students, bool):
         return [f"student{k:02d}" for k in range(1, int(students) + 1)]
     if isinstance(students, str) or not isinstance(students, Iterable) or not all(isinstance(name, str) for name in students):
-        raise _core.EvaluationError(f"students={students!r}: how many there are, or a list of their names")
+        raise _core.EvaluationError(f"students={students!r}: give their number, or a list of their names")
     return list(students)
 
 
 def _gaps(task: Exercise) -> list[int]:
-    """Lines whose own text is accepted as an answer: one that only names what the line before spells out is not asked for."""
+    """Return the lines whose own text is accepted as an answer: a line that only names an expression of the line before is not a gap."""
     fit = [line for line in task.gaps() if task.leaving_out(line).answer(task.steps[line - 1].after_text())]
     return fit or task.gaps()
 
 
 def _question(statement: str, gaps: list[int], blanks: int, draw: random.Random) -> Question:
-    """Lines to leave out, no two in a row where there are others: each is then judged between lines that are seen."""
+    """Return the lines to leave out, avoiding neighbours, so that each gap lies between visible lines."""
     chosen: list[int] = []
     for line in draw.sample(gaps, len(gaps)):
         if len(chosen) < blanks and not any(abs(line - other) == 1 for other in chosen):
@@ -238,12 +238,12 @@ def _question(statement: str, gaps: list[int], blanks: int, draw: random.Random)
 
 
 def grade(path: str | Path, sheet: Worksheet | None = None) -> Grade:
-    """Judge the answers in a worksheet's notebook. With `sheet` the questions are those that were handed out, whatever the file says.
+    """Judge the answers in a worksheet's notebook. With `sheet`, the questions come from the sheet instead of the file.
 
     Raises
     ------
     ModelError
-        The file is no notebook, or no worksheet of `worksheet`.
+        The file is not a notebook, or not a worksheet of `worksheet`.
     """
     path = Path(path)
     try:
@@ -254,13 +254,13 @@ def grade(path: str | Path, sheet: Worksheet | None = None) -> Grade:
             sheet = Worksheet(str(told["topic"]), str(told["student"]), asked)
         cells = [(cell.get("metadata", {}).get("tags", []), "".join(cell.get("source", ""))) for cell in notebook["cells"]]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise _core.ModelError(f"{path}: no notebook of a worksheet ({type(error).__name__}: {error})") from None
+        raise _core.ModelError(f"{path} is not the notebook of a worksheet ({type(error).__name__}: {error})") from None
     answers = {tag: _answers(source) for tags, source in cells for tag in tags if tag.startswith("answers-")}
     return _judged(sheet, answers)
 
 
 def _answers(source: str) -> dict[Any, Any]:
-    """The dictionary that a cell of answers assigns, read as data: nothing of a student's notebook is run."""
+    """Return the dictionary assigned in a cell of answers, read as data: a student's notebook is never run."""
     try:
         for statement in ast.parse(source).body:
             if isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Dict):

@@ -1,10 +1,10 @@
-"""The plan of an expression written out as the textbook recursion: in text, in LaTeX, as Python that needs NumPy alone and as C++ that
-needs Eigen alone.
+"""The plan of an expression written out as the textbook recursion: in text, in LaTeX, as Python that needs only NumPy and as C++ that
+needs only Eigen.
 
-A plan names sweeps and kernels; here they are unfolded into the equations of body k, its parent p and its children c. `steps` holds one
-writer per kind of step, and all four languages are written from its equations. Source runs by itself: it takes the tree, the given blocks
-(E, H, M, J, and what else the expression reads) and x, and computes P, D, G, ψ, R, Υ, ... on its way; the functions of `runtime/` that it
-calls are copied in front of it.
+A plan names sweeps and kernels; this module expands them into the equations of body k, its parent p and its children c. `steps` holds one
+writer per kind of step, and all four languages are written from its equations. Source is self-contained: it takes the tree, the given
+blocks (E, H, M, J, and the other letters of the expression) and x, and computes P, D, G, ψ, R, Υ, ... as needed; the functions of
+`runtime/` that it calls are copied to its start.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from . import step_blocks, step_realizations, step_vectors  # noqa: F401 - they register their writers
+from . import step_blocks, step_realizations, step_vectors  # noqa: F401 - imported to register their writers
 from .cpp_source import CppSource
 from .formulas import At, Product, Quantity
 from .naming import Workbook
@@ -42,12 +42,12 @@ _TITLES = {
 
 
 class Algorithm:
-    """A recursion that computes an expression, as text, LaTeX, Python or C++. `str()` is the language that was asked for.
+    """A recursion that computes an expression, as text, LaTeX, Python or C++. `str()` returns the requested language.
 
     Attributes
     ----------
-    text, latex : the recursion as a book writes it
-    language, request : what was asked for
+    text, latex : the recursion in textbook notation
+    language, request : the arguments of `Operator.algorithm`
 
     Examples
     --------
@@ -86,10 +86,10 @@ class Algorithm:
         self._needed = needed.union(inside)
 
     def __reduce__(self):
-        return Algorithm, (self._expression, self.language, self.request)  # a plan is of one process, and made anew
+        return Algorithm, (self._expression, self.language, self.request)  # a plan belongs to one process and is built again
 
     def _sum(self) -> Program:
-        """The scalar: numbers and parts added up."""
+        """Add up the numbers and parts of a scalar."""
         program = Program(items=list(self._book.items))
         terms = []
         for recursion, (_, _, coefficient) in zip(self._recursions, self._parts, strict=True):
@@ -112,7 +112,7 @@ class Algorithm:
     # ------------------------------------------------------------------ what is shown
     @property
     def title(self) -> str:
-        """What is computed, in one line."""
+        """The computed result, in one line."""
         if isinstance(self._expression, _core.Scalar):
             return f"{Text().letter(self._program.result)} = {self._expression.text()}"
         shape = "y = {}" if self.request == "apply" and not self._program.inputs else _TITLES[self.request]
@@ -175,16 +175,16 @@ class Algorithm:
 
     # ------------------------------------------------------------------ source
     def python(self, *, with_data: bool = False, name: str = "algorithm") -> str:
-        """A Python module that needs NumPy alone: `name(data, x)`; `with_data` adds DATA, the numbers at the present state."""
+        """Return a Python module that needs only NumPy: `name(data, x)`; `with_data` adds DATA, the values at the present state."""
         _check_name(name)
         source = PythonSource(self._book, self._arguments(), self._needed)
         return source.module(self._program, self.title, self._shape(), _listed(self.data()) if with_data else None, name)
 
     def cpp(self, *, with_data: bool = False, name: str = "algorithm") -> str:
-        """A C++17 source that needs Eigen alone: `name::run(data, x)` in a namespace of that name.
+        """Return a C++17 source that needs only Eigen: `name::run(data, x)` in a namespace of that name.
 
-        `with_data` adds `name::present()`, the numbers at the present state, and a `main` that prints the result for x = 1
-        (left out where NO_MAIN is defined).
+        `with_data` adds `name::present()`, the values at the present state, and a `main` that prints the result for x = 1
+        (omitted if NO_MAIN is defined).
         """
         _check_name(name)
         source = CppSource(self._book, self._arguments(), self._needed)
@@ -192,11 +192,11 @@ class Algorithm:
 
     # ------------------------------------------------------------------ steps
     def lines(self) -> list[tuple[int, str]]:
-        """The recursion line by line, with how deep each stands: what `text` shows without its head."""
+        """Return the recursion line by line, with the indentation of each: `text` without its head."""
         return self._lines(Text())
 
     def passes(self) -> list[Pass]:
-        """The passes over trees that make the recursion, one after the other: direction, tree and lines of each.
+        """Return the recursion's passes over trees in order: direction, tree and lines of each.
 
         Examples
         --------
@@ -208,24 +208,24 @@ class Algorithm:
         return told_passes(self._program, self._book.trees)
 
     def steps(self, x: Any = None, q: Any = None, v: Any = None, *, state: int = 0) -> list[Step]:
-        """What the recursion computes on its way, equation by equation and body by body, in the order of its passes.
+        """Return the intermediate results of the recursion, equation by equation and body by body, in the order of its passes.
 
         Parameters
         ----------
-        x : (n,) or (n, m), what the operator is applied to; ones where it is left out
-        q, v, state : as of `data`
+        x : (n,) or (n, m), argument of the operator; default: ones
+        q, v, state : as for `data`
 
         Returns
         -------
         list of Step
-            Of eliminations and of recursions inside the recursion one each, of no body: what is inside is not told apart.
+            An elimination, or a recursion inside the recursion, is one step without a body; its inner steps are not listed.
 
         Raises
         ------
         EvaluationError
-            A vector that the expression does not take; an operator from outside, of which no equations are known.
+            An x that the expression does not take; an external operator, which has no equations.
 
-        Cost: that of the Python source, once.
+        Cost: one run of the Python source.
 
         Examples
         --------
@@ -248,21 +248,21 @@ class Algorithm:
     def _shape(self) -> str:
         if isinstance(self._expression, _core.Scalar):
             return "scalar"
-        whole = self._program.result.kind == "matrix"  # of R^n, which is cut into no bodies
+        whole = self._program.result.kind == "matrix"  # of R^n, which is not divided among bodies
         return "matrix" if self.request == "blockdiag" and whole else _RESULTS.get(self.request, "scalar")
 
     # ------------------------------------------------------------------ numbers
     def data(self, q: Any = None, v: Any = None, *, state: int = 0) -> dict[str, Any]:
-        """The numbers that the source takes: the tree and the given blocks, at the present state or at (q, v).
+        """Return the data that the source takes: the tree and the given blocks, at the present state or at (q, v).
 
         Parameters
         ----------
-        q, v : a state for what is not bound to one; the model's present state if left out
-        state : which of a batch, where the expression is bound to a batch
+        q, v : state of the unbound letters; default: the model's present state
+        state : index in the batch, if the expression is bound to a batch
 
         Returns
         -------
-        A dictionary of lists and arrays. An operator from outside is missing: put a callable in its place.
+        A dictionary of lists and arrays. An external operator is missing: put a callable in its place.
         """
         plans = self._plans
         if q is not None:
@@ -288,7 +288,7 @@ class Algorithm:
         return data
 
     def json(self, q: Any = None, v: Any = None, *, state: int = 0) -> str:
-        """The same numbers as JSON text; the Python source takes them as they are read back."""
+        """Return the same data as JSON text; the Python source accepts the parsed data."""
         return json.dumps(_listed(self.data(q, v, state=state)))
 
     def _place_of(self, model: Any) -> tuple[int, int]:
@@ -300,9 +300,9 @@ class Algorithm:
 
 
 def _check_name(name: str) -> None:
-    """A name that both languages take."""
+    """Check that a name is valid in both languages."""
     if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
-        raise _core.EvaluationError(f"name={name!r}: source needs a name of letters, digits and underscores")
+        raise _core.EvaluationError(f"name={name!r}: start with a letter, and use only letters, digits and underscores")
 
 
 def _place(words: Text, quantity: Quantity) -> str:
@@ -338,7 +338,7 @@ def _listed(value: Any) -> Any:
 
 
 def algorithm(expression: Any, language: str = "text", request: str = "apply") -> Algorithm:
-    """The recursion that computes an operator's request (apply, dense, diagonal, blockdiag, trace, logdet, norm), or a scalar.
+    """Return the recursion that computes an operator's request (apply, dense, diagonal, blockdiag, trace, logdet, norm), or a scalar.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""Parts of the sources in `runtime/`, read from the files and copied into what is written: those that it calls, with those that they call.
+"""Parts of the sources in `runtime/`, copied into written programs: the parts that a program calls, and the parts that these call.
 
-A part of a Python file is a function or a class; one of a C++ header is what stands between two blank lines at the level of its namespace.
+A part of a Python file is a function or a class; a part of a C++ header is the text between two blank lines at namespace level.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ TOPICS = ("matrices", "stacking", "cross_products", "tree_system")  # in the ord
 
 
 class Part(NamedTuple):
-    """A run of source: what it defines, the names that it reads or calls, and its text, which ends in a newline."""
+    """A piece of source: the names that it defines, the names that it reads or calls, and its text, which ends in a newline."""
 
     names: tuple[str, ...]
     uses: frozenset[str]
@@ -42,19 +42,19 @@ def cpp_parts() -> tuple[Part, ...]:
 
 @cache
 def cpp_letters() -> str:
-    """The names of types that every C++ program is written with."""
+    """Return the type aliases of every C++ program."""
     return "\n".join(part.text for part in parts_of_cpp(source_of("letters.h")))
 
 
 @cache
 def cpp_includes() -> frozenset[str]:
-    """What the headers include from outside."""
+    """Return the external includes of the headers."""
     texts = [source_of(f"{name}.h") for name in ("letters", *TOPICS)]
     return frozenset(header for text in texts for header in re.findall(r"^#include <(.+)>", text, re.M))
 
 
 def parts_of_python(text: str) -> list[Part]:
-    """The functions and classes of a module; its imports are left behind."""
+    """Return the functions and classes of a module, without its imports."""
     lines, parts = text.splitlines(keepends=True), []
     for node in ast.parse(text).body:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
@@ -64,7 +64,7 @@ def parts_of_python(text: str) -> list[Part]:
 
 
 def parts_of_cpp(text: str) -> list[Part]:
-    """What stands in a header's namespace, cut at the blank lines that stand in no braces."""
+    """Return the content of a header's namespace, split at blank lines outside braces."""
     inside = re.search(r"^namespace [\w:]+ \{\n(.*)^\}  // namespace", text, re.M | re.S)
     assert inside
     parts, lines, depth = [], [], 0
@@ -79,14 +79,14 @@ def parts_of_cpp(text: str) -> list[Part]:
 
 
 def part_of_cpp(text: str) -> Part:
-    """A run of C++ with the names that it defines at its left margin, and those of what it calls that is no member."""
+    """Return a piece of C++ with the names that it defines at its left margin, and the names of the non-member functions that it calls."""
     names = re.findall(r"^(?:inline [\w:]+|class|using) (\w+)", text, re.M)
     code = re.sub(r"//.*", "", text)
     return Part(tuple(names), frozenset(re.findall(r"(?<![\w.>:])\w+(?=\()", code)), text)
 
 
 def copied(parts: Sequence[Part], called: Iterable[str]) -> list[str]:
-    """The texts of the parts that are called, with those that they use, in their order."""
+    """Return the texts of the called parts and of the parts that these use, in order."""
     defined_in = {name: part for part in parts for name in part.names}
     needed: set[Part] = set()
     to_do = [defined_in[name] for name in called]

@@ -1,4 +1,4 @@
-"""Recursions as C++17 that needs Eigen alone."""
+"""Recursions as C++17 that needs only Eigen."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ class CppSource(Passes):
         return [f"[[maybe_unused]] const int {x.columns} = static_cast<int>(given_{x.name}.cols());", self.given(x)]
 
     def given(self, q: Quantity) -> str:
-        """An argument, cut where it lies in a space of bodies."""
+        """Return an argument, divided among bodies if its space is."""
         if isinstance(q.rows, Cut):
             return self.declared("const Blocks", q.name, self.call("cut", f"given_{q.name}", q.rows.name))
         return f"const Matrix& {q.name} = given_{q.name};"
@@ -167,7 +167,7 @@ class CppSource(Passes):
 
     # ------------------------------------------------------------------ the file
     def file(self, program: Program, title: str, shape: str, data: dict[str, Any] | None, name: str) -> str:
-        """The source; `shape` says what is returned: "vector", "matrix", "blocks", "scalar"."""
+        """Return the source; `shape` is the kind of result: "vector", "matrix", "blocks", "scalar"."""
         given = self.parameters(program)
         run = self.run(program, title, shape)
         present = self.present(data) if data is not None else []
@@ -200,7 +200,7 @@ class CppSource(Passes):
         return [self.remark(title), f"inline {_RESULT_TYPES[shape]} run({parameters}) {{", *self.indented(body), "}"]
 
     def members(self) -> list[str]:
-        """What Data holds."""
+        """Return the members of Data."""
         lines = [f"std::vector<int> parent{tree.suffix};" for tree in self.book.trees]
         lines += [f"{'std::vector<int>' if cut.contiguous else 'Rows'} {cut.key};" for cut in self.book.cuts]
         for leaf in self.leaves:
@@ -212,11 +212,11 @@ class CppSource(Passes):
         return lines
 
     def present(self, data: dict[str, Any]) -> list[str]:
-        """A function that gives Data filled with the numbers."""
+        """Return a function that returns Data filled with values."""
         return ["", "inline Data present() {", *self.indented(["Data data;", *self.literals(data), "return data;"]), "}"]
 
     def literals(self, data: dict[str, Any]) -> list[str]:
-        """The numbers as statements that fill Data."""
+        """Return statements that fill Data with values."""
         lines = []
         for key, value in data.items():
             if isinstance(value, np.ndarray):

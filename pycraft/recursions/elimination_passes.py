@@ -7,7 +7,7 @@ from .passes import Equation, Item, Once, Selected, Sweep, System, Term
 
 
 class SystemLetters:
-    """Letters of a system's blocks; one quantity per letter and way of writing."""
+    """Letters of a system's blocks; one quantity per letter and index notation."""
 
     def __init__(self, system: System):
         self._number = system.quantity.number
@@ -21,7 +21,7 @@ class SystemLetters:
 
 
 def system_passes(system: System) -> list[Item]:
-    """Block elimination of T s = b, leaves to root, as equations; with the border b where there is one."""
+    """Block elimination of T s = b, leaves to root, as equations; with the border b if there is one."""
     L = SystemLetters(system)
     A, U, T, up, down = L("A", "k"), L("U", "k"), L("T", "kk"), L("T", "pk"), L("T", "kp")
     up_child = At(up, "c")

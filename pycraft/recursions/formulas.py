@@ -1,6 +1,6 @@
-"""What recursions are written with: quantities, and formulas of one body and its neighbours.
+"""Elements of recursions: quantities, and formulas of one body and its neighbours.
 
-Everything here and in `passes` is data. `steps` makes it from a plan; `recursion`, `python_source` and `cpp_source` write it down.
+Everything here and in `passes` is data. `steps` builds it from a plan; `recursion`, `python_source` and `cpp_source` print it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ..formula_nodes import Node, Product, Suffixed, flat
 # ---------------------------------------------------------------------- quantities
 @dataclass(frozen=True)
 class Letter:
-    """How a quantity is called: in text, in LaTeX and as an identifier; `plus` puts a ⁺ behind (and `_plus`)."""
+    """Names of a quantity: in text, in LaTeX and as an identifier; `plus` appends ⁺ (and `_plus`)."""
 
     name: str
     text: str
@@ -23,7 +23,7 @@ class Letter:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """How a space is cut into bodies. `rows[k]` are body k's entries of a vector; contiguous cuts are given by their sizes."""
+    """Division of a space among bodies. `rows[k]` are body k's entries of a vector; contiguous divisions are given by their sizes."""
 
     name: str
     key: str
@@ -44,8 +44,8 @@ COLUMNS = "m"  # as many columns as x has
 class Quantity:
     """A letter with its shape.
 
-    `kind` is "blocks" (one block per body), "matrix" (one for all), "scalar", or "function" (somebody else's operator). `rows` and
-    `columns` are a cut, a number, or `COLUMNS`. `indices` is how a block is written: "k", "pk" (edges up), "kp" (edges down), "kk".
+    `kind` is "blocks" (one block per body), "matrix" (one for all), "scalar", or "function" (an external operator). `rows` and
+    `columns` are a cut, a number, or `COLUMNS`. `indices` is the index notation of a block: "k", "pk" (edges up), "kp" (edges down), "kk".
     """
 
     name: str
@@ -74,7 +74,7 @@ class Transposed(Suffixed):
 
 @dataclass(frozen=True)
 class Inverse(Suffixed):
-    """X⁻¹: a solve where something follows it."""
+    """X⁻¹: a solve if a factor follows it."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class HingeRow(Node):
 
 @dataclass(frozen=True)
 class Part(Node):
-    """The rows (axis 0) or columns (axis 1) of a dense matrix that belong to body k; of its transpose where `transposed`."""
+    """The rows (axis 0) or columns (axis 1) of a dense matrix that belong to body k; of its transpose if `transposed`."""
 
     quantity: Quantity
     cut: Cut
@@ -133,19 +133,19 @@ class Assembled(Node):
 
 
 def star(node: Node) -> Node:
-    """The transpose, not written twice."""
+    """Return the transpose; a double transpose cancels."""
     return node.inner if isinstance(node, Transposed) else Transposed(node)
 
 
 def product(*factors: Node) -> Node:
-    """A product, flat, identities left out."""
+    """Return a flat product without identities."""
     whole = flat(factors)
     kept = [factor for factor in whole if not isinstance(factor, Identity)] or whole[:1]
     return kept[0] if len(kept) == 1 else Product(tuple(kept))
 
 
 def moved(node: Node, places: dict[str, str]) -> Node:
-    """The same formula at another body: {"k": "c"} reads it at a child."""
+    """Return the same formula at another body: {"k": "c"} reads it at a child."""
     if isinstance(node, At):
         return At(node.quantity, places.get(node.at, node.at))
     if isinstance(node, Transposed):

@@ -1,4 +1,4 @@
-"""Letters and where they come from: names that do not clash, the trees and cuts of a plan's spaces, the letters of each model at
+"""Letters and their definitions: names that do not clash, the trees and divisions of a plan's spaces, the letters of each model at
 each state, and the recursions that define P, D, G, R, Υ, V, ... from the blocks E, H, M, J.
 """
 
@@ -85,7 +85,7 @@ class Tree:
 
 
 class Workbook:
-    """What the parts of one algorithm share: names, trees, cuts, models at states, what is given, and the passes that define letters."""
+    """Data shared by the parts of one algorithm: names, trees, divisions, models at states, given data, passes that define letters."""
 
     def __init__(self) -> None:
         self.names = Names()
@@ -123,7 +123,7 @@ class Workbook:
         return known
 
     def tree_of(self, space: Any) -> Tree:
-        """The tree that a space is cut by; where no model is in the plan, bodies without a parent."""
+        """Return the tree of a space's bodies; if the plan has no model, bodies without a parent."""
         if space._owner in self._owners:
             return self._owners[space._owner]
         for known in self.trees:
@@ -155,7 +155,7 @@ class Workbook:
 
     # ------------------------------------------------------------------ what is given
     def constant(self, data: dict[str, Any], rows: Cut | int, columns: Cut | int) -> Quantity:
-        """A user's numbers: blocks where they are block diagonal over the bodies, else a matrix (rows, columns)."""
+        """Return a user's constant: blocks if it is block diagonal over the bodies, else a matrix (rows, columns)."""
         if data["id"] not in self._constants:
             if len(data["blocks"]):
                 assert isinstance(rows, Cut) and isinstance(columns, Cut)
@@ -179,7 +179,7 @@ class Workbook:
         return self._constants[data["id"]]
 
     def external(self, name: str, transposed: bool, rows: Cut | int, columns: Cut | int) -> Quantity:
-        """Somebody else's operator, or its transpose: a function of matrices."""
+        """Return an external operator, or its transpose: a function of matrices."""
         if (name, transposed) not in self._externals:
             made = self.named(name + ("_transposed" if transposed else ""), "function", rows=rows, columns=columns)
             self._externals[name, transposed] = made
@@ -187,7 +187,7 @@ class Workbook:
         return self._externals[name, transposed]
 
     def sort_leaves(self) -> None:
-        """What is given, in the order E, H, M, J, ..., model by model; constants last."""
+        """Sort the given quantities in the order E, H, M, J, ..., model by model, with constants last."""
         order = {name: i for i, name in enumerate(_GIVEN)}
         self.leaves.sort(key=lambda leaf: (leaf.context < 0, leaf.context, order.get(leaf.symbol, len(order))))
 
@@ -211,11 +211,11 @@ _SQUARE = (
 )
 _GIVEN = ("E", "H", "M", "J", "H_dot", "B", "theta_dot", "gravity_base", "dM", "Pi", "phi_S", "H_S", "X_r", "X_r_dot", "dX_r")
 _GIVEN_OF_GROUPS = ("V_tilde", "V_bar", "Delta_theta_dot", "momentum_cross", "X_world", "Delta", "h", "a", "b", "gravity_field")
-"""Of groups of bodies: what is made body by body within them."""
+"""Quantities of groups of bodies that are built body by body within a group."""
 
 
 class Model:
-    """The letters of one model at one state: given blocks, and the recursions for the others, written once and where first needed."""
+    """The letters of one model at one state: given blocks, and the recursions for the others, each written once, before its first use."""
 
     def __init__(self, book: Workbook, index: int, source: Any, binding: int, hinge_diagonal: bool):
         self.book, self.index, self.source, self.binding = book, index, source, binding
@@ -228,7 +228,7 @@ class Model:
 
     @property
     def words(self) -> str:
-        """Which model, and whether at a state of its own."""
+        """The model, and its bound state, in words."""
         return f"of '{self.source.name}'" + (" at a bound state" if self.binding else "")
 
     # ------------------------------------------------------------------ shapes and places
@@ -262,12 +262,12 @@ class Model:
         self.book.items.append(Sweep(self.tree, direction, list(equations)))
 
     def letter(self, name: str, arguments: tuple[Any, ...] = (), columns: Cut | None = None) -> Quantity:
-        """The quantity of a letter, its recursion written where this is the first use of it."""
+        """Return the quantity of a letter; the first use writes its recursion."""
         if (name, arguments) in self._made:
             return self._made[name, arguments]
         if (self.source.derived_from or ("",))[0] == "loops":
             raise _core.EvaluationError(
-                f"no recursion is written for {name}, rows of loops: write out the rest, and put what model.loops.jacobian gives between"
+                f"no recursion is written for {name}, the rows of loops: write out the other factors, and insert model.loops.jacobian"
             )
         inserted = name == "h" and arguments[0] == "twist"  # within a hinge: given
         if name in _GIVEN or inserted or (self.source.groups is not None and name in _GIVEN_OF_GROUPS):
@@ -352,7 +352,7 @@ class Model:
         self.sweep(0, Equation(self._new("momentum_cross"), (Term(Function("cross_of_momentum", product(M, V))),)))
 
     def _direction(self, name: str, arguments: tuple[Any, ...]) -> None:
-        """Δ = crf(h) at the body of a direction: a coordinate, whose twist h is a row of H, or a twist given within a hinge."""
+        """Δ = crf(h) at the body of a direction: a coordinate, with twist h a row of H, or a twist given within a hinge."""
         twist: Node
         if arguments[0] == "coordinate":
             body, row = 0, arguments[1]

@@ -1,7 +1,7 @@
-"""Equations, the passes over the tree that they make, and the programs that these make.
+"""Equations, the passes over the tree that they form, and the programs formed of passes.
 
-An equation gives one block of a quantity at body k by what is known at k, at its children c or at its parent p, so its reading says
-in which direction the tree must be passed: tip to base where a child is read, base to tip where the parent is.
+An equation gives one block of a quantity at body k from quantities at k, at its children c or at its parent p. So its operands determine
+the direction of the pass over the tree: tip to base if a child is read, base to tip if the parent is read.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from .formulas import COLUMNS, Assembled, At, Cut, DiagonalPart, HingeRow, Ident
 # ---------------------------------------------------------------------- equations and passes
 @dataclass(frozen=True)
 class Term:
-    """c · formula; `over` "c": summed over the children, "p": where there is a parent, "bodies": summed over all bodies k.
+    """c · formula; `over` "c": summed over the children, "p": only if there is a parent, "bodies": summed over all bodies k.
 
-    With `body`, the term is there at this body only.
+    With `body`, the term exists only at this body.
     """
 
     node: Node
@@ -30,7 +30,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Equation:
-    """target(k) = Σ terms; nothing: zero. `symmetric`: so in exact arithmetic, and kept so."""
+    """target(k) = Σ terms; no terms: zero. `symmetric`: symmetric in exact arithmetic, and kept symmetric."""
 
     target: Quantity
     terms: tuple[Term, ...]
@@ -59,7 +59,7 @@ class System:
     """T s = b: the equations of a realization. Relation i: Σ terms[i] over states s_j = inputs[i].
 
     A term of a relation is (term, j): it multiplies state j. States and equations of body spaces are cut by `cuts[j]`; a number
-    there says that state j belongs to no body (the border).
+    there means that state j belongs to no body (the border).
     """
 
     quantity: Quantity
@@ -70,7 +70,7 @@ class System:
 
     @property
     def border(self) -> bool:
-        """Whether some states belong to no body."""
+        """True if some states belong to no body."""
         return any(isinstance(cut, int) for cut in self.cuts)
 
 
@@ -83,7 +83,7 @@ class Elimination:
 
 @dataclass
 class Solution:
-    """The system solved for one right-hand side: inputs[i] are the terms of equation i, `wanted` the states that are read."""
+    """The system solved for one right-hand side: inputs[i] are the terms of equation i, `wanted` the requested states."""
 
     system: System
     inputs: tuple[tuple[Term, ...], ...]
@@ -114,7 +114,7 @@ class CompositeAssembly:
 
 @dataclass
 class Operator:
-    """A recursion inside a recursion: w = X x of an operator that is made dense; `quantity` is X."""
+    """A recursion inside a recursion: w = X x of an operator formed as a dense matrix; `quantity` is X."""
 
     quantity: Quantity
     text: str
@@ -144,7 +144,7 @@ class InverseBlock(Node):
 
 @dataclass(frozen=True)
 class MadeDense(Node):
-    """The matrix of an operator that is known by its recursion: applied to the columns of the identity."""
+    """The matrix of an operator given by its recursion, applied to the columns of the identity."""
 
     operator: Operator
 
@@ -209,7 +209,7 @@ def writes(item: Item) -> list[Quantity]:
 # ---------------------------------------------------------------------- programs
 @dataclass
 class Leaf:
-    """A quantity that is given: a symbol's blocks at a context's state, a user's constant, or an operator from outside."""
+    """A quantity that is given: a symbol's blocks at a context's state, a user's constant, or an external operator."""
 
     quantity: Quantity
     source: str  # "symbol", "root frame", "constant", "external"
@@ -221,16 +221,16 @@ class Leaf:
 
 @dataclass
 class Program:
-    """A recursion: what it takes, its passes in order, and its result."""
+    """A recursion: its inputs, its passes in order, and its result."""
 
     inputs: list[Quantity] = field(default_factory=list)
     items: list[Item] = field(default_factory=list)
-    result: Quantity = None  # type: ignore[assignment]  # set when it is written
+    result: Quantity = None  # type: ignore[assignment]  # set when the recursion is written
     identity_columns: bool = False  # x is the identity
 
 
 def fused(items: list[Item]) -> list[Item]:
-    """Neighbouring passes over one tree that go the same way are one: every equation reads what is final when it is reached."""
+    """Fuse neighbouring passes over one tree in the same direction: every equation still reads final values."""
     made: list[Item] = []
     for item in items:
         last = made[-1] if made else None
@@ -243,12 +243,12 @@ def fused(items: list[Item]) -> list[Item]:
 
 
 def pruned(items: list[Item], needed: set[Quantity]) -> list[Item]:
-    """Without the equations whose result nobody reads; `needed` grows by what the rest reads."""
+    """Return the passes without equations that nobody reads; `needed` grows by the operands of the others."""
     kept: list[Item] = []
     for item in reversed(items):
         if isinstance(item, Sweep):
             before = -1
-            while before != len(needed):  # an equation may be read at a child or a parent by one in front of it
+            while before != len(needed):  # an earlier equation may read this one at a child or a parent
                 before = len(needed)
                 for equation in reversed(item.equations):
                     if equation.target in needed:

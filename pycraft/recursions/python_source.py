@@ -1,4 +1,4 @@
-"""Recursions as a Python module that needs NumPy alone."""
+"""Recursions as a Python module that needs only NumPy."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ class PythonSource(Passes):
 
     # ------------------------------------------------------------------ the module
     def module(self, program: Program, title: str, shape: str, data: dict[str, Any] | None, name: str) -> str:
-        """The source; `shape` says what is returned: "vector", "matrix", "blocks", "scalar", or "everything" by its name."""
+        """Return the source; `shape` is the kind of result: "vector", "matrix", "blocks", "scalar", or "everything" by name."""
         given = self.parameters(program)
         body = self.prologue()
         for q in self.inputs:
@@ -181,7 +181,7 @@ class PythonSource(Passes):
         return text
 
     def returned(self, program: Program, shape: str) -> list[str]:
-        """What the function returns: where one vector was given, one vector."""
+        """Return the function's last lines: one vector in, one vector out."""
         if shape == "everything":
             return ["return locals()"]
         if shape == "blocks":

@@ -1,4 +1,4 @@
-"""Recursions as a book writes them: in text with Unicode letters, and in LaTeX."""
+"""Recursions in textbook notation: in text with Unicode letters, and in LaTeX."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from .passes import (
 )
 
 _SHOWN = 1000
-"""Ratios over a larger number are shown as decimals."""
+"""Ratios with a larger denominator are shown as decimals."""
 _PLACES = {
     "k": {"k": "k", "p": "p", "c": "c"},
     "pk": {"k": "p,k", "c": "k,c"},
@@ -54,7 +54,7 @@ Line = tuple[int, str]  # depth, text
 
 
 def pass_words(direction: int) -> str:
-    """How a pass is announced."""
+    """Return the heading of a pass."""
     return {-1: "for k from tip to base:", 1: "for k from base to tip:", 0: "for every body k:"}[direction]
 
 
@@ -86,7 +86,7 @@ class Text:
 
     # ------------------------------------------------------------------ formulas
     def node(self, node: Node, marks: str = "") -> str:
-        """A formula; `marks` are the star and the inverse that stand behind it."""
+        """Return a formula; `marks` are the star and the inverse that follow it."""
         if isinstance(node, Transposed):
             return self.node(node.inner, marks + "*")
         if isinstance(node, Inverse):
@@ -106,7 +106,7 @@ class Text:
         return f"({inner})" + marks.replace("-1", "⁻¹")
 
     def plain(self, node: Node) -> str:
-        """A formula that is no letter and no product."""
+        """Return a formula that is neither a letter nor a product."""
         if isinstance(node, Identity):
             return "I"
         if isinstance(node, Function):
@@ -170,7 +170,7 @@ class Text:
         return f"{self.letter(target)}{self.place(target, at)} = {self.terms(equation.terms)}{where}"
 
     def only_at(self, body: int) -> str:
-        """Says that a block is there at one body alone."""
+        """Return the words for a block that exists at one body only."""
         return f" for k = {body}, else 0"
 
     # ------------------------------------------------------------------ passes

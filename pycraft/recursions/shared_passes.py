@@ -1,4 +1,4 @@
-"""Passes over the bodies as source of any language: sweeps, systems assembled and solved, what is read before them and returned after."""
+"""Passes over the bodies as source of any language: sweeps, assembly and solution of systems, reading of data, and return values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Passes(Source):
 
     @abstractmethod
     def none_yet(self, names: Sequence[str], n: str) -> str:
-        """Variables that will hold a block for each of n bodies."""
+        """Empty variables for a block of each of n bodies."""
 
     @abstractmethod
     def parent_here(self, tree: int) -> str:
@@ -55,19 +55,19 @@ class Passes(Source):
 
     @abstractmethod
     def added(self, block: str, sign: str, value: str) -> str:
-        """Added to a block of something larger."""
+        """Addition to a block of a larger object."""
 
     @abstractmethod
     def placed(self, matrix: str, rows: str, columns: str, value: str) -> str:
-        """Put in some rows and columns of a matrix."""
+        """Assignment to some rows and columns of a matrix."""
 
     @abstractmethod
     def assigned(self, equation: Equation) -> list[str]:
-        """An equation of body k computed."""
+        """Computation of an equation of body k."""
 
     @abstractmethod
     def assigned_whole(self, equation: Equation) -> list[str]:
-        """An equation of the whole computed."""
+        """Computation of an equation of the whole."""
 
     @abstractmethod
     def system_made(self, system: System) -> list[str]:
@@ -75,7 +75,7 @@ class Passes(Source):
 
     @abstractmethod
     def received(self, x: Quantity) -> list[str]:
-        """The columns of an input counted, and the input cut where it lies in a space of bodies."""
+        """Number of columns of an input, and the input divided among bodies if its space is."""
 
     @abstractmethod
     def operator(self, item: Operator) -> list[str]:
@@ -83,19 +83,19 @@ class Passes(Source):
 
     @abstractmethod
     def tree_read(self, suffix: str) -> list[str]:
-        """A tree taken from the data: its parents, children and number of bodies."""
+        """A tree read from the data: its parents, children and number of bodies."""
 
     @abstractmethod
     def rows_read(self, cut: Cut) -> str:
-        """The rows of every body, made of what the data hold."""
+        """The rows of every body, built from the data."""
 
     @abstractmethod
     def leaf_read(self, q: Quantity) -> list[str]:
-        """A given quantity taken from the data."""
+        """A given quantity read from the data."""
 
     # ------------------------------------------------------------------ lines
     def remark(self, text: str) -> str:
-        """A line that explains."""
+        """A comment line."""
         return self.remark_sign + text
 
     def indented(self, lines: Sequence[str]) -> list[str]:
@@ -103,7 +103,7 @@ class Passes(Source):
         return [self.step + line if line else "" for line in lines]
 
     def over_bodies(self, tree: int, lines: Sequence[str], direction: int = 1) -> list[str]:
-        """A loop over bodies, none where nothing is done in it."""
+        """A loop over bodies; nothing if its body is empty."""
         return [self.loop(direction, tree), *self.indented(lines), *self.closing] if lines else []
 
     # ------------------------------------------------------------------ passes
@@ -198,12 +198,12 @@ class Passes(Source):
 
     # ------------------------------------------------------------------ systems, entry by entry
     def extents(self, system: System) -> tuple[str, str]:
-        """(the sizes of a body's states, those of the border's), zero for what lies in the other."""
+        """Return the sizes of a body's states and of the border's states, zero for states of the other kind."""
         bodies = ", ".join(self.extent(c, "k") if isinstance(c, Cut) else "0" for c in system.cuts)
         return bodies, ", ".join("0" if isinstance(c, Cut) else str(c) for c in system.cuts)
 
     def relations(self, system: System) -> Iterator[tuple[bool, str, list[Entry]]]:
-        """Of each equation of T: whether it is one of every body, how it reads, and its entries."""
+        """Return for each equation of T: True if every body has it, its text, and its entries."""
         for i, relation in enumerate(system.relations):
             entries = []
             for term, j in relation:
@@ -212,13 +212,13 @@ class Passes(Source):
             yield isinstance(system.cuts[i], Cut), WORDS.relation(system, i), entries
 
     def right_sides(self, item: Solution) -> Iterator[tuple[bool, str, list[tuple[str, str]]]]:
-        """Of each equation: whether it is one of every body, how its right side reads, and (sign, value) of what is added to it."""
+        """Return for each equation: True if every body has it, the text of its right side, and (sign, value) of the added terms."""
         for i, terms in enumerate(item.inputs):
             added = [self.signed(term.node, term.coefficient) for term in terms]
             yield isinstance(item.system.cuts[i], Cut), WORDS.input_equation(item, i) if terms else "", added
 
     def signed(self, node: Node, coefficient: Any) -> tuple[str, str]:
-        """(the operator that adds, the value without its sign)."""
+        """Return the operator of the addition, and the value without its sign."""
         return "-=" if coefficient < 0 else "+=", self.scaled(Term(node, abs(coefficient)), True)
 
     # ------------------------------------------------------------------ the program
@@ -227,22 +227,22 @@ class Passes(Source):
         return [q for q in self.inputs if not (q in program.inputs and program.identity_columns)]
 
     def prologue(self) -> list[str]:
-        """What is read from the data: the trees, the cuts and the given blocks."""
+        """Return the lines that read the data: the trees, the divisions and the given blocks."""
         lines = [line for tree in self.book.trees for line in self.tree_read(tree.suffix)]
         lines += [self.declared("[[maybe_unused]] const Rows", cut.name, self.rows_read(cut)) for cut in self.book.cuts]
         return lines + [line for leaf in self.leaves for line in self.leaf_read(leaf.quantity)]
 
     def body(self, program: Program) -> list[str]:
-        """The inside of a function up to what it returns: what is given cut, and the passes."""
+        """Return the body of a function up to its return: the divided inputs, and the passes."""
         lines = [line for x in program.inputs for line in self.received(x)]
         return [*lines, *(line for item in program.items for line in self.item(item)), ""]
 
     def result(self, program: Program) -> str:
-        """What a function returns: blocks as one vector, whatever else as it is."""
+        """Return the result of a function: blocks as one vector, other results unchanged."""
         return self.at(At(program.result, ""))
 
     def documentation(self, program: Program, shape: str) -> list[str]:
-        """What the function takes and returns, in words."""
+        """Return the documentation of the function's arguments and result."""
         lines = ["data: the tree and the blocks that are given,"]
         for tree in self.book.trees:
             lines.append(f"    parent{tree.suffix}: each body's parent, -1 for the base; parents come before their children")
@@ -261,7 +261,7 @@ class Passes(Source):
 
 
 class Entry(NamedTuple):
-    """A term added to one block of T: which block, whether it is there only where there is a parent, where, and what."""
+    """A term added to one block of T: the block, True if it needs a parent, the place, and the value."""
 
     place: str
     guarded: bool
@@ -271,7 +271,7 @@ class Entry(NamedTuple):
 
 
 def meaning(q: Quantity, where: str) -> str:
-    """A given quantity in words; `where` says of which model it is, if not of the first."""
+    """Return a given quantity in words; `where` names its model, except for the first model."""
     letter = WORDS.letter(q)
     if q.kind == "function":
         return f"a function that applies {letter} to the columns of a matrix"
@@ -284,7 +284,7 @@ def meaning(q: Quantity, where: str) -> str:
 
 
 def place_of(system: System, i: int, j: int, term: Term) -> tuple[str, bool]:
-    """Which block of T a term of equation i on state j belongs to, and whether it is there only where there is a parent."""
+    """Return the block of T for a term of equation i on state j, and True if the term needs a parent."""
     row, column = isinstance(system.cuts[i], Cut), isinstance(system.cuts[j], Cut)
     if row and column:
         place = {"": "own", "c": "up", "p": "down"}[term.over]
@@ -293,5 +293,5 @@ def place_of(system: System, i: int, j: int, term: Term) -> tuple[str, bool]:
 
 
 def at_child(node: Node) -> Node:
-    """What a parent sums over its children, read at the child: c becomes k, k becomes p."""
+    """Return a parent's sum over children as read at the child: c becomes k, k becomes p."""
     return moved(node, {"c": "k", "k": "p"})

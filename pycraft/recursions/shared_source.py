@@ -1,4 +1,4 @@
-"""Formulas as source of any language: how products with inverses are computed, and which helpers that calls for."""
+"""Formulas as source of any language: the computation of products with inverses, and the helper functions needed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Source(ABC):
     # ------------------------------------------------------------------ words of a language, given by subclasses
     @abstractmethod
     def length(self, cut: Cut, k: str) -> str:
-        """How many rows of a space belong to body k."""
+        """The number of rows of body k in a space."""
 
     @abstractmethod
     def identity(self, n: int | str) -> str:
@@ -67,7 +67,7 @@ class Source(ABC):
 
     # ------------------------------------------------------------------ formulas
     def call(self, name: str, *arguments: str) -> str:
-        """A helper called; it will be written in front."""
+        """A call of a helper function, which is then copied to the start."""
         self.used.add(name)
         return f"{name}({', '.join(arguments)})"
 
@@ -87,7 +87,7 @@ class Source(ABC):
         return self.of_a_matrix_or_system(node)
 
     def of_a_matrix_or_system(self, node: Node) -> str:
-        """A formula that is special to dense matrices and systems."""
+        """A formula specific to dense matrices and systems."""
         if isinstance(node, Identity):
             return self.identity(self.extent(node.cut, "k"))
         if isinstance(node, HingeRow):
@@ -163,7 +163,7 @@ class Source(ABC):
 
     # ------------------------------------------------------------------ shapes
     def suffix(self, tree: int) -> str:
-        """Of the arrays of a tree."""
+        """The suffix of the names of a tree's arrays."""
         return self.book.trees[tree].suffix
 
     def extent(self, cut: Cut | int | str, k: str) -> str:
@@ -178,7 +178,7 @@ class Source(ABC):
 
 
 def is_vector(node: Node) -> bool:
-    """Whether a formula has the columns of x."""
+    """Return True if a formula has the columns of x."""
     if isinstance(node, Transposed):
         return False
     if isinstance(node, Product):

@@ -11,7 +11,7 @@ from .steps import Formula, Recursion, Step, writer
 # ---------------------------------------------------------------------- blocks
 @writer("load_blocks")
 def _load_blocks(r: Recursion, step: Step) -> None:
-    """The blocks of a letter or of a block-diagonal constant: read where they are needed."""
+    """The blocks of a letter or of a block-diagonal constant, read where needed."""
     if step["constant"] is None:
         r.values[step["out"]] = r.symbol(step)
     else:
@@ -43,7 +43,7 @@ def _combine_blocks(r: Recursion, step: Step) -> None:
 
 @writer("transpose_blocks")
 def _transpose_blocks(r: Recursion, step: Step) -> None:
-    """B*(k), read where it is needed."""
+    """B*(k), read where needed."""
     value = r.value(step["in"][0])
     if isinstance(value.node, Product):
         value = Formula(At(r.stored(step["in"][0])))
@@ -73,7 +73,7 @@ def _function_blocks(r: Recursion, step: Step) -> None:
     names = {"crm": "crm", "crf": "crf", "mcross": "cross_of_momentum"}
     if name in names and r.models[step["context"]].source.groups is not None:
         raise _core.EvaluationError(
-            f"{name} of a vector goes body by body within a group of bodies, which no recursion over groups says; "
+            f"{name} of a vector acts body by body within a group, which a recursion over groups cannot express; "
             "write out the operators of the model itself"
         )
     r.define(r.target(step["out"]), Term(Function(names.get(name, "lower_half"), At(inner))))

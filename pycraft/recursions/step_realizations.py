@@ -35,7 +35,7 @@ def _factor(r: Recursion, step: Step) -> None:
         over = "bodies" if isinstance(node, Part) and node.axis else ""
         relations[t["row"]].append((Term(node, t["coefficient"], over), t["column"]))
     quantity = book.new("T", "function", tree=tree)
-    if not quantity.number and book.names.chosen & set("AUXYSNFZ"):  # letters of the elimination that the user has taken
+    if not quantity.number and book.names.chosen & set("AUXYSNFZ"):  # letters of the elimination that the user already uses
         quantity = book.new("T", "function", tree=tree)
     system = System(quantity, tree, tuple(states), cuts, tuple(map(tuple, relations)))
     r.systems[step["out"]] = system, data

@@ -14,7 +14,7 @@ _GROUPS = {"kinematics": 1, "articulated": 2, "composite": 4, "compliance": 8, "
 # ---------------------------------------------------------------------- values
 @writer("values")
 def _values(r: Recursion, step: Step) -> None:
-    """The recursions behind a group of letters; the given blocks E, H, M, J need none, velocities are written where they are read."""
+    """The recursions behind a group of letters; the given blocks E, H, M, J need none, velocities are written where they are first read."""
     model, groups = r.models[step["context"]], step["groups"]
     if groups & (_GROUPS["articulated"] | _GROUPS["inverse"]):
         model.articulated_inertia()
@@ -223,7 +223,7 @@ def _mass_matrix_dense(r: Recursion, step: Step) -> None:
 # ---------------------------------------------------------------------- dense matrices
 @writer("dense_factor")
 def _dense_factor(r: Recursion, step: Step) -> None:
-    """A, the operand X made dense column by column, or X*X; what solves with it factors it."""
+    """A, the operand X made dense column by column, or X*X; solves with A factor it."""
     X = r.operator(step)
     if not step["flag"]:
         r.values[step["out"]] = X
@@ -249,7 +249,7 @@ def _logdet_of_dense(r: Recursion, step: Step) -> None:
 
 @writer("blocks_of_dense")
 def _blocks_of_dense(r: Recursion, step: Step) -> None:
-    """B(k) = A(k,k), A an operator made dense."""
+    """B(k) = A(k,k), A an operator formed as a dense matrix."""
     A = r.operator(step)
     shape = r._block_shape(r.plan["registers"][step["out"]])
     r.define(r.target(step["out"]), Term(DiagonalPart(A, shape["rows"], shape["columns"])))

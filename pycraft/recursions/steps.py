@@ -1,7 +1,7 @@
-"""From the steps of a plan to equations: one short writer per kind of step. What is written in mathematics, Python and C++ comes from here.
+"""Equations from the steps of a plan: one short writer per kind of step, the source of all output in mathematics, Python and C++.
 
-A register of the plan is a quantity, or, where one letter was applied to something that is read once, the formula itself, so that
-`H* x` is read where it is needed.
+A register of the plan is a quantity, or, if one letter is applied to a register that is read once, the formula itself, so that
+`H* x` appears where it is needed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _VECTOR_LETTERS = {"Θ": "u", "V": "alpha", "F": "f", "W": "w"}
 
 
 def writer(*kinds: str) -> Callable[[Callable[[Recursion, Step], None]], Callable[[Recursion, Step], None]]:
-    """Registers a function as the writer of these kinds of steps."""
+    """Register a function as the writer of these kinds of steps."""
 
     def register(function: Callable[[Recursion, Step], None]) -> Callable[[Recursion, Step], None]:
         WRITERS.update(dict.fromkeys(kinds, function))
@@ -87,7 +87,7 @@ class Recursion:
         return program
 
     def _result(self) -> Quantity:
-        """The quantity that is returned: y, or for a diagonal or a trace taken from columns what they hold."""
+        """Return the result: y, or for a diagonal or a trace computed from columns, the quantity of the columns."""
         plan = self.plan
         register = plan["registers"][plan["output"]]
         request = plan["request"]
@@ -130,7 +130,7 @@ class Recursion:
         return {"tree": rows.tree, "rows": rows, "columns": columns}
 
     def columns_of(self, register: int) -> int | str:
-        """How many columns a vector register has."""
+        """Return the number of columns of a vector register."""
         return self.columns if self.plan["registers"][register]["wide"] and not self.unit_input else 1
 
     def target(self, out: int, letter: str = "") -> Quantity:
@@ -169,13 +169,13 @@ class Recursion:
         return value
 
     def term(self, register: int, *left: Node, coefficient: float = 1.0, over: str = "") -> Term:
-        """c · left factors · register, the register read at k, or at c or p where the term runs over them."""
+        """c · left factors · register, the register read at k, or at c or p if the term runs over them."""
         value = self.value(register)
         node = moved(value.node, {"k": over}) if over in ("c", "p") else value.node
         return Term(product(*left, node), coefficient * value.coefficient, over)
 
     def inline(self, step: Step, node: Node, coefficient: float = 1.0) -> bool:
-        """Keeps a formula that is read once, short and of body k alone, unwritten until then."""
+        """Keep a short formula of body k that is read once, and write it where it is read."""
         out = step["out"]
         short = not isinstance(node, Product) or len(node.factors) <= 4
         local = all(q.kind == "blocks" for q in quantities_in(node))
@@ -194,7 +194,7 @@ class Recursion:
         self.program.items.append(Once(Equation(target, terms)))
 
     def define(self, target: Quantity, *terms: Term) -> None:
-        """An equation in any order: of every body, or of the whole where the target is."""
+        """Add an equation in any order: of every body, or of the whole if the target is."""
         if target.kind == "blocks":
             self.sweep(0, Equation(target, terms))
         else:
@@ -210,7 +210,7 @@ class Recursion:
         return self.models[step["context"]].letter(symbol["name"], tuple(symbol["arguments"]), columns)  # type: ignore[arg-type]  # JSON
 
     def inlined(self, step: Step) -> None:
-        """The equations of a step's operand in the place of the step."""
+        """Insert the equations of a step's operand in place of the step."""
         operand, out = step["operand"], step["out"]
         letter = self.result_letter if out == self.plan["output"] and self.plan["request"] == "apply" else "w"
         nested = Recursion(self.book, operand, letter, self.vectors, nested=True)

@@ -1,4 +1,4 @@
-"""What a recursion computes on its way: its Python source is run once and every block kept, in the order in which passes make them."""
+"""Intermediate results of a recursion: its Python source is run once, and every block is kept in the order of the passes."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .recursion import Line, Text
 
 @dataclass(frozen=True)
 class Step:
-    """One equation at one body, or what is computed as a whole.
+    """One equation at one body, or one computation of the whole.
 
     Attributes
     ----------
-    line : of `Algorithm.lines()`; of a whole the first one of several
-    lines : how many lines say it
-    number, direction : of the pass, -1 tip to base, 1 base to tip, 0 in any order
-    tree, body : the body's number in that tree of the plan's; -1 of a whole
-    letter, name : of the quantity, as text shows it and as source calls it
-    value : (rows, columns) of the block; nothing, (0, 0), of a whole
+    line : index in `Algorithm.lines()`; for a computation of the whole, the first of several
+    lines : number of lines
+    number, direction : number of the pass and its direction, -1 tip to base, 1 base to tip, 0 in any order
+    tree, body : the body's number in a tree of the plan; -1 for the whole
+    letter, name : the quantity's letter in text and its name in source
+    value : the block, (rows, columns); empty, (0, 0), for the whole
     """
 
     line: int
@@ -42,13 +42,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass of a recursion over a tree, or what is computed as a whole.
+    """One pass of a recursion over a tree, or one computation of the whole.
 
     Attributes
     ----------
-    ways : directions in which the tree is passed one after the other, -1 tip to base, 1 base to tip; none where the order is free
-    parents : of the tree that is passed, -1 the base; None of what is computed as a whole
-    lines : how deep each line of it stands, and the line, as in `Algorithm.lines()`
+    ways : successive directions of the pass, -1 tip to base, 1 base to tip; empty if the order is free
+    parents : parents of the tree's bodies, -1 the base; None for a computation of the whole
+    lines : indentation and text of each line, as in `Algorithm.lines()`
     """
 
     ways: tuple[int, ...]
@@ -78,7 +78,7 @@ def _passed(item: Item, trees: Sequence[Any]) -> tuple[tuple[int, ...], tuple[in
 
 
 def taken_steps(program: Program, arguments: list[Quantity], source: str, data: dict[str, Any], x: Any) -> list[Step]:
-    """`Algorithm.steps`; source: of a function `algorithm(data, ...)` that returns everything by its name."""
+    """Return `Algorithm.steps`; the source defines a function `algorithm(data, ...)` that returns everything by name."""
     names: dict[str, Any] = {}
     exec(compile(source, "<recursion>", "exec"), names)
     given = [] if program.identity_columns else [_given(quantity, x, quantity in program.inputs) for quantity in arguments]
@@ -116,5 +116,5 @@ def _given(quantity: Quantity, x: Any, is_input: bool) -> np.ndarray:
         return np.ones(n)
     given = np.asarray(_core.real_array(x, "x"), float)
     if given.ndim not in (1, 2) or given.shape[0] != n or not np.isfinite(given).all():
-        raise _core.EvaluationError(f"x takes {n} finite numbers, or columns of as many, not an array {given.shape}")
+        raise _core.EvaluationError(f"x takes {n} finite values, or a matrix of such columns, not an array {given.shape}")
     return given

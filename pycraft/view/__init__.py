@@ -1,4 +1,4 @@
-"""Figures of models, by Matplotlib alone, and films of sweeps, pages by themselves."""
+"""Figures of models, which need only Matplotlib, and films of sweeps, which are self-contained pages."""
 
 from .shares import Shares
 from .stick_figure import StickFigure, plot_model

@@ -1,4 +1,4 @@
-"""Lines, points and labels of a picture in the plane or in space, whose places can be set again without drawing the rest anew."""
+"""Lines, points and labels of a picture in the plane or in space; their places can be updated without redrawing the rest."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ import numpy as np
 
 
 class Canvas:
-    """Axes with what they show of space: `columns` are the two coordinates of a plane, None for all three."""
+    """Axes and the coordinates that they show: `columns` are the two coordinates of a plane, None for all three."""
 
     def __init__(self, ax: Any, columns: tuple[int, int] | None):
         self.ax, self.columns = ax, columns
-        self._shared = bool(ax.has_data())  # with what was drawn before
+        self._shared = bool(ax.has_data())  # with earlier drawings
 
     def _seen(self, places: np.ndarray) -> np.ndarray:
         return places if self.columns is None else places[..., self.columns]
 
     def lines(self, **style: Any) -> Lines:
-        """Lines of one style, none yet."""
+        """Return an empty set of lines of one style."""
         return Lines(self, **style)
 
     def points(self, **style: Any) -> Points:
-        """Markers of one style, none yet."""
+        """Return an empty set of markers of one style."""
         return Points(self, **style)
 
     def discs(self, colours: list[str], size: float, **style: Any) -> Discs:
-        """Discs of a colour each, `size` points wide."""
+        """Return discs with a colour each, `size` points wide."""
         return Discs(self, colours, size, **style)
 
     def labels(self, texts: list[str], **style: Any) -> Labels:
-        """Texts beside points."""
+        """Return texts beside points."""
         return Labels(self, texts, **style)
 
     def frame(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Shows the box from `low` to `high`, (3,) each, with equal scales; what the axes showed before stays in view."""
+        """Show the box from `low` to `high`, (3,) each, with equal scales; earlier drawings stay in view."""
         names = "xyz" if self.columns is None else "xy"
         low, high = self._seen(low), self._seen(high)
         if self._shared:
@@ -87,7 +87,7 @@ class Points:
 
 
 class Discs:
-    """Discs of a colour each: `artist`, and `set` with the places (n, 3)."""
+    """Discs with a colour each: `artist`, and `set` with the places (n, 3)."""
 
     def __init__(self, canvas: Canvas, colours: list[str], size: float, **style: Any):
         self._canvas = canvas

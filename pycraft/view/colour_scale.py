@@ -1,4 +1,4 @@
-"""Colours of numbers: one scale from dark to light that colour-blind readers follow, legible on light and on dark pages."""
+"""Colours of values: one scale from dark to light, suited to colour-blind readers, legible on light and on dark pages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _DARKEST, _LIGHTEST = 0.12, 0.9  # of viridis: both ends differ from white and f
 
 @cache
 def ramp() -> tuple[str, ...]:
-    """Nine colours of Matplotlib's viridis, "#rrggbb", of which colours between are mixed."""
+    """Nine colours of Matplotlib's viridis, "#rrggbb"; colours between them are interpolated."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -21,7 +21,7 @@ def ramp() -> tuple[str, ...]:
 
 
 def shade(value: float, low: float, high: float) -> str:
-    """The colour of a number between `low` and `high`, "#rrggbb"; grey where it is not finite."""
+    """Return the colour of a value between `low` and `high`, "#rrggbb"; grey if it is not finite."""
     if not np.isfinite(value):
         return "#9a9a9a"
     share = (value - low) / (high - low) if high > low else 0.0
@@ -33,7 +33,7 @@ def shade(value: float, low: float, high: float) -> str:
 
 
 def colour_bar(x: float, y: float, width: float, low: float, high: float, label: str) -> str:
-    """The scale in SVG: a strip 10 high with its ends' numbers below and what they are of above, which ends 28 below y."""
+    """Return the scale in SVG: a strip 10 high, with the label above and the end values below, down to y + 28."""
     steps = 48
     size = f"y='{y:g}' width='{width / steps + 0.3:.2f}' height='10'"
     parts = [f"<rect x='{x + width * i / steps:.2f}' {size} fill='{shade(i / (steps - 1), 0, 1)}'/>" for i in range(steps)]

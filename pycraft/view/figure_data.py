@@ -1,4 +1,4 @@
-"""A model's skeleton as plain data for a page, which draws it by itself: points and lines fixed on bodies, and the bodies' poses."""
+"""A model's skeleton as plain data for a self-contained page: points and lines fixed on bodies, and the bodies' poses."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from .skeleton import Skeleton, placed
 from .stick_figure import HINGES
 
 _FLAT_AXES = {1: (0, 2), 2: (0, 1), 0: (1, 2)}
-"""To the right and upwards, of a plane by its normal."""
+"""Axes to the right and upwards in a plane, by its normal."""
 _THIN = 0.18
-"""Of the largest width: what the narrow ones of a box are at least."""
+"""Least width of the box in view, as a fraction of its largest width."""
 _BELOW = 0.05
-"""Of a standing model's width: how far it may reach below its base."""
+"""Largest reach below the base of a standing model, as a fraction of its width."""
 
 
 def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
-    """What `web/figure.js` draws.
+    """Return the data that `web/figure.js` draws.
 
     Parameters
     ----------
     skeleton : Skeleton
     q : (..., nq)
-        States whose bodies the first view has in its box.
+        States whose bodies the first view includes.
 
     Returns
     -------
     dict
-        Plain data: names of bodies, the number of what carries each (-1 the base), their hinges; points and lines by what they are, with
-        the numbers of bodies ("of") and places in their frames ("at", m); axes of hinges and half the length that they are drawn with,
+        Plain data: names of bodies, the number of each parent (-1 the base), their hinges; points and lines by kind, with
+        the numbers of bodies ("of") and places in their frames ("at", m); axes of hinges and half of their drawn length,
         m; the camera's axes "right" and "up" in the world, the box in view ("centre" and "half", m; "near", half of the first state's),
-        the height of the floor (the base's, unless the model hangs below it at the first state); "ramp", the colours of numbers;
-        "solids", triangles of shapes by their bodies, and "unshown", why others are not there.
+        the height of the floor (the base, unless the model hangs below it at the first state); "ramp", the colours of values;
+        "solids", triangles of shapes by their bodies, and "unshown", why other shapes are missing.
     """
     described = skeleton.model.description()["bodies"]
     hinge, owner, point, direction = skeleton.axes
@@ -56,30 +56,30 @@ def figure_data(skeleton: Skeleton, q: np.ndarray) -> dict[str, Any]:
 
 
 def pose_rows(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-    """Poses of all bodies at q (..., nq) as rows (..., 12 n) of [R p], one body after the other, in single precision."""
+    """Return the poses of all bodies at q (..., nq) as rows (..., 12 n) of [R p], body after body, in single precision."""
     poses = skeleton.poses(q)[..., :-1, :3, :]
     return poses.reshape(*poses.shape[:-3], -1).astype("<f4")
 
 
 def number_text(x: Any) -> str:
-    """Numbers in single precision as text, for `numbers` of `web/figure.js`."""
+    """Return numbers in single precision as text, for `numbers` of `web/figure.js`."""
     return base64.b64encode(np.ascontiguousarray(x, "<f4").tobytes()).decode("ascii")
 
 
 def upright(model: Any) -> tuple[int, int]:
-    """Return the axes (0, 1, 2 for x, y, z) to the right and upwards in a picture: upwards the one that gravity is nearest to, else z."""
+    """Return the axes (0, 1, 2 for x, y, z) to the right and upwards in a picture: upwards the axis nearest to gravity, else z."""
     gravity = np.abs(model.gravity)
     up = int(np.argmax(gravity)) if gravity.any() else 2
     return (up + 1) % 3, up
 
 
 def _rounded(x: np.ndarray) -> Any:
-    """With the digits of single precision."""
+    """Return the values with the digits of single precision."""
     return [float(f"{number:.7g}") for number in x] if x.ndim == 1 else [_rounded(row) for row in x]
 
 
 def _corners(vertices: np.ndarray) -> np.ndarray:
-    """(8, 3) of the box that they are in."""
+    """Return the corners (8, 3) of the box around the points."""
     ends = np.array([vertices.min(axis=0), vertices.max(axis=0)])
     return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
@@ -87,7 +87,7 @@ def _corners(vertices: np.ndarray) -> np.ndarray:
 def _box(skeleton: Skeleton, q: np.ndarray, grounded: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> dict[str, Any]:
     poses = skeleton.poses(q)
     shown = _shown_points(skeleton, poses, grounded, solid)
-    loose = skeleton.is_loose()  # then the base is not part of what is seen of the first state
+    loose = skeleton.is_loose()  # then the box of the first state excludes the base
     first = _shown_points(skeleton, poses.reshape(-1, *poses.shape[-3:])[0], grounded and not loose, solid)
     low, high, half = _extent_of(shown)
     reach = float((high - low).max()) or 1.0
@@ -100,7 +100,7 @@ def _box(skeleton: Skeleton, q: np.ndarray, grounded: bool, up: int, solid: list
 
 
 def _shown_points(skeleton: Skeleton, poses: np.ndarray, grounded: bool, solid: list[tuple[int, np.ndarray]]) -> np.ndarray:
-    """All that is drawn, (n, 3): points, ends of lines, corners of shapes, and the base's origin where that is shown."""
+    """Return all drawn points, (n, 3): points, ends of lines, corners of shapes, and the base's origin if it is shown."""
     kinds = [kind for kind in skeleton.lines if kind != "ground" or grounded]
     shown = (*skeleton.points.values(), *(skeleton.lines[kind] for kind in kinds))
     corners = [(np.full(8, of), _corners(vertices)) for of, vertices in solid]
@@ -109,14 +109,14 @@ def _shown_points(skeleton: Skeleton, poses: np.ndarray, grounded: bool, solid: 
 
 
 def _extent_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The ends of a box around points, and half of its edges with a margin, none of which is thin."""
+    """Return the ends of a box around points, and half of its edges with a margin, enlarged where the box is thin."""
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.zeros(3))
     reach = float((high - low).max()) or 1.0
     return low, high, np.maximum((high - low) / 2, _THIN * reach) + 0.06 * reach
 
 
 def _floor(first: np.ndarray, low: np.ndarray, loose: bool, up: int, solid: list[tuple[int, np.ndarray]]) -> float:
-    """The height of the floor: under the base of what stands, under the first state of what is loose, else under all that is seen."""
+    """Return the height of the floor: under the base of a standing model, under a loose model's first state, or under all points."""
     lowest = float(first[:, up].min(initial=np.inf))
     if loose:
         return lowest if np.isfinite(lowest) else float(low[up])

@@ -1,7 +1,7 @@
-"""Hypotheses as switches: a page that shows which theorems of the catalogue break, and by how much, when one is no longer met.
+"""Hypotheses as switches: a page that shows which theorems of the catalogue break, and by how much, when a hypothesis is violated.
 
-Every combination of the switches is a model, on which all theorems are checked when the page is made, as `soa.check` checks them: the
-residuals are numbers of that model at a random state, in the scalar that decides, and the page needs no server.
+Every combination of the switches is a model. When the page is made, all theorems are checked on all models, as by `soa.check`: the
+residuals are computed at a random state, in the deciding precision. The page needs no server.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ SWITCHES = {
     "hinges": ("single-DOF", "ball", "universal"),
     "base": ("fixed", "free"),
 }
-"""The switches, each with its positions; at first all stand at the first one. Balls have three coordinates and a constant H, universal
-hinges two and an H that is none."""
+"""The switches and their positions; the first position is the initial one. Balls have three coordinates and a constant H; universal
+hinges have two and an H that is not constant."""
 _KINDS = {"single-DOF": "pin", "ball": "ball", "universal": "universal"}
 _LEAST, _MOST = 3, 16
-"""Bodies: two have no branch; of many, the page is long in the making."""
+"""Least and largest number of bodies: two bodies have no branch; many make the page slow to build."""
 
 
 class HypothesisPage(Page):
@@ -43,7 +43,7 @@ class HypothesisPage(Page):
     Attributes
     ----------
     specs : dict
-        The models by the switches' positions, ("J = 0", "chain", "ball", "fixed").
+        Models by the switches' positions, such as ("J = 0", "chain", "ball", "fixed").
     """
 
     HEIGHT = 620
@@ -51,23 +51,23 @@ class HypothesisPage(Page):
     def __init__(self, bodies: Any = 4, seed: Any = 0, progress: Callable[[str], None] | bool = True):
         count = whole(bodies, "bodies")
         if not _LEAST <= count <= _MOST:
-            raise _core.EvaluationError(f"bodies={count}: from {_LEAST}, of which two are on a branch each, to {_MOST}")
+            raise _core.EvaluationError(f"bodies={count}: give {_LEAST} (the fewest that branch) to {_MOST}")
         self._seed = whole(seed, "seed")
         if self._seed < 0:
-            raise _core.EvaluationError(f"seed={self._seed}: a whole number, 0 or more")
+            raise _core.EvaluationError(f"seed={self._seed}: give a whole number, 0 or more")
         self.specs = {positions: _spec(positions, count, self._seed) for positions in itertools.product(*SWITCHES.values())}
         self._progress, self._reports = progress, dict[tuple[str, ...], Report]()
 
     def broken(self, *positions: str) -> list[Any]:
-        """The findings of theorems that do not hold with these positions: outside their hypotheses, and by their residuals false or
+        """Return the findings of theorems that fail with these positions: theorems outside their hypotheses whose residuals are large or
         undefined."""
         return [finding for finding in self.report(*positions).findings if _state(finding) in ("breaks", "undefined")]
 
     def report(self, *positions: str) -> Report:
-        """Every theorem on the model of these positions, one of each switch in their order. EvaluationError for others."""
+        """Return the report of all theorems on the model of these positions, one per switch in order. Others raise EvaluationError."""
         if positions not in self.specs:
             known = "; ".join(f"{name}: {', '.join(map(repr, choices))}" for name, choices in SWITCHES.items())
-            raise _core.EvaluationError(f"no positions {positions}: one of each of {known}, in this order")
+            raise _core.EvaluationError(f"unknown positions {positions}: give one of each of {known}, in this order")
         if positions not in self._reports:
             if callable(self._progress):
                 self._progress(", ".join(positions))
@@ -78,7 +78,7 @@ class HypothesisPage(Page):
 
     @cached_property
     def html(self) -> str:
-        said: dict[str, Any] = {}  # some are said of some models alone
+        said: dict[str, Any] = {}  # some statements exist only on some models
         findings = []
         with StepProgress(len(self.specs), "models", not callable(self._progress) and self._progress is not False) as bar:
             for positions in self.specs:
@@ -114,28 +114,28 @@ class HypothesisPage(Page):
 
 
 def hypothesis_switches(bodies: int = 4, seed: int = 0, *, progress: Callable[[str], None] | bool = True) -> HypothesisPage:
-    """A page with switches for the hypotheses of theorems: J, chain or branch, the kind of hinges, fixed or free base.
+    """Return a page with switches for the hypotheses of theorems: J, chain or branch, the kind of hinges, fixed or free base.
 
-    Flipping one shows which theorems of the catalogue break, and by how much. Every combination is a model, 24 of them, on which the
-    theorems are checked as `soa.check` checks them, when it is first asked for: half a second each at four bodies; the page asks for all.
+    Flipping a switch shows which theorems of the catalogue break, and by how much. Each of the 24 combinations is a model, on which the
+    theorems are checked as by `soa.check` on first use: half a second each at four bodies; the page uses all.
 
     Parameters
     ----------
-    bodies : of each model, 3 to 16
-    seed : of their inertias, hinges and state
-    progress : True: a bar in a terminal or notebook while the page is made; False: none; a function: called with the positions before each
-        model
+    bodies : number of bodies of each model, 3 to 16
+    seed : seed of their random inertias, hinges and state
+    progress : True shows a bar in a terminal or notebook while the page is made; a function is called with the positions before each
+        model; False shows nothing
 
     Returns
     -------
     HypothesisPage
-        A notebook shows it; `save("hypotheses.html")` writes a page that opens offline; `broken("J > 0", "chain", "ball", "fixed")` are the
-        findings of one combination, `report(...)` all of them.
+        A notebook shows it; `save("hypotheses.html")` writes a page that opens offline; `broken("J > 0", "chain", "ball", "fixed")` returns
+        the failures of one combination, `report(...)` all of its findings.
 
     Raises
     ------
     EvaluationError
-        A number of bodies, or a seed, that is none.
+        An invalid number of bodies or seed.
 
     Examples
     --------
@@ -150,7 +150,7 @@ def hypothesis_switches(bodies: int = 4, seed: int = 0, *, progress: Callable[[s
 
 
 def _spec(positions: tuple[str, ...], count: int, seed: int) -> Spec:
-    """The model of these positions: a chain, or two branches from the first body."""
+    """Return the specification of the model of these positions: a chain, or two branches from the first body."""
     J, tree, hinges, base = positions
     parents = tuple(range(-1, count - 1)) if tree == "chain" else (-1, 0, *(max(0, k - 2) for k in range(2, count)))
     kinds = ["free" if base == "free" else _KINDS[hinges], *[_KINDS[hinges]] * (count - 1)]
@@ -158,7 +158,7 @@ def _spec(positions: tuple[str, ...], count: int, seed: int) -> Spec:
 
 
 def _in_motion(spec: Spec, seed: int) -> Any:
-    """The model at a random state, which is its present one."""
+    """Return the model, set to a random state."""
     model = spec.model()
     state = model.random_state(seed)
     model.q, model.v = state.q, state.v
@@ -166,14 +166,14 @@ def _in_motion(spec: Spec, seed: int) -> Any:
 
 
 def _state(finding: Any) -> str:
-    """In the page's words: "holds", "breaks" where it is false outside its hypotheses, "holds anyway" where it is not, and the others."""
+    """Return the page's word: "holds"; outside the hypotheses "breaks" or "holds anyway"; else the verdict."""
     if finding.verdict == "expected to fail":
         return "breaks" if finding.states else "undefined"
     return str(finding.verdict)
 
 
 def _size(finding: Any) -> float | None:
-    """The relative residual: in double of what fails, in the scalar that decided of what holds."""
+    """Return the relative residual: in double if the theorem fails, in the deciding precision if it holds."""
     if not finding.states:
         return None
     value = finding.residual if finding.verdict in ("expected to fail", "fails") else finding.wide_residual

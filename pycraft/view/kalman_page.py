@@ -1,7 +1,7 @@
-"""The Kalman dictionary running: a smoother's recursion over time beside forward dynamics of a chain, one equation for both, step by step.
+"""The Kalman dictionary in action: a smoother's recursion over time beside forward dynamics of a chain, the same equations step by step.
 
-Both are y = (HφMφ*H* + J)⁻¹ x, by the same two sweeps: of measurements x the innovations ε and the adjoint variable α = λ, of which the
-smoothed state is z + Pλ; of hinge forces x (at rest, without gravity) the hinge accelerations y and the bodies' accelerations α. Tip to
+Both are y = (HφMφ*H* + J)⁻¹ x, by the same two sweeps. From measurements x: the innovations ε and the adjoint variable α = λ; the
+smoothed state is z + Pλ. From hinge forces x (at rest, without gravity): the hinge accelerations y and the bodies' accelerations α. Tip to
 base is forward in time. [G. Rodriguez, "Kalman filtering, smoothing and recursive robot arm forward and inverse dynamics", IEEE
 J. Robotics and Automation 3(6), 1987; A. Jain, Robot and Multibody Dynamics, Springer 2011]
 """
@@ -23,25 +23,25 @@ from .sweep_picture import told_value
 from .web_page import web_page
 
 MOST = 60
-"""Time steps, and bodies: eleven equations each."""
+"""Largest number of time steps, and of bodies; each has eleven equations."""
 BENT = 2 * np.pi / 3
-"""rad: the angle between the first and the last rod of the chain beside the filter."""
+"""Angle, rad, between the first and the last rod of the chain beside the filter."""
 ROTOR = 0.2
-"""kg m², of each hinge of that chain: the measurement noise in the dictionary."""
+"""Rotor inertia, kg m², of each hinge of the chain: the measurement noise in the dictionary."""
 WORDS = {
     "P": ("covariance of the predicted state", "articulated-body inertia: k and all outboard of it, hinges free"),
     "D": ("covariance of the innovation", "inertia that the hinge feels"),
     "G": ("Kalman gain", "force on the body for one of the hinge"),
-    "P⁺": ("covariance of the filtered state", "what of P the hinge hands inward"),
-    "z": ("predicted state, less its mean", "force on the body that the outboard hinges leave"),
-    "ε": ("innovation: what the measurement tells that is new", "what of the hinge force is left to accelerate"),
+    "P⁺": ("covariance of the filtered state", "part of P that the hinge passes inward"),
+    "z": ("predicted state, less its mean", "force on the body from outboard, hinges free"),
+    "ε": ("innovation: new information in the measurement", "part of the hinge force left to accelerate"),
     "ν": ("innovation, weighted by its covariance", "hinge acceleration as if the inboard body stood still"),
-    "z⁺": ("filtered state, less its mean", "force that is handed inward"),
-    "α⁺": ("adjoint variable, from the step after", "acceleration that comes from inboard"),
+    "z⁺": ("filtered state, less its mean", "force passed inward"),
+    "α⁺": ("adjoint variable, from the step after", "acceleration from inboard"),
     "y": ("(ℳ + J)⁻¹ of the measurements", "hinge acceleration"),
     "α": ("adjoint variable λ; the smoothed state is z + Pλ", "acceleration of the body, spatial"),
 }
-"""Of each letter of the recursion, what it is of the filter and in mechanics."""
+"""Meaning of each letter of the recursion, in the filter and in mechanics."""
 
 
 class KalmanPage(Page):
@@ -58,19 +58,21 @@ class KalmanPage(Page):
 
     def __init__(self, track: Any, y: Any = None, model: Any = None, tau: Any = None):
         if track.steps > MOST:
-            raise _core.EvaluationError(f"{track.steps} time steps: {MOST} at most are played; a model of fewer shows the same recursion")
+            raise _core.EvaluationError(
+                f"{track.steps} time steps: at most {MOST} can be played; a model with fewer shows the same recursion"
+            )
         self.track = track
         self.measurements, _, soa, x = track._given(y)
         self.model = _chain(track.steps) if model is None else _checked(model, track.steps)
         force = _core.real_array(np.ones(self.model.nv) if tau is None else tau, "tau")
         if force.shape != (self.model.nv,):
-            raise _core.ModelError(f"tau {force.shape}: one number a coordinate of {self.model.name!r}, ({self.model.nv},)")
+            raise _core.ModelError(f"tau {force.shape}: give one value per coordinate of {self.model.name!r}, ({self.model.nv},)")
         self._estimates = track.filter(y), track.smooth(y)
         written, self.filter_steps = _played(soa, x)
         self.lines = ["  " * depth + text for depth, text in written.lines()]
         other, self.mechanics_steps = _played(self.model.soa, force)
-        if _order(self.filter_steps) != _order(self.mechanics_steps):  # the lines differ by J alone, where there are no rotors
-            raise _core.EvaluationError(f"{self.model.name!r} takes another recursion than the filter:\n{other}")
+        if _order(self.filter_steps) != _order(self.mechanics_steps):  # the recursions differ only in J, if there are no rotors
+            raise _core.EvaluationError(f"{self.model.name!r} has another recursion than the filter:\n{other}")
 
     @cached_property
     def html(self) -> str:
@@ -91,7 +93,7 @@ class KalmanPage(Page):
         return web_page("kalman", "The Kalman dictionary", data, {"said": said})
 
     def _measured(self, states: np.ndarray) -> np.ndarray:
-        """C x at every step."""
+        """Return C x at every step."""
         return np.einsum("tmi,ti->tm", self.track._C, states)
 
     def __repr__(self) -> str:
@@ -119,18 +121,18 @@ def _chain(count: int) -> Any:
 
 def _checked(model: Any, count: int) -> Any:
     if not isinstance(model, _core.Multibody):
-        raise _core.ModelError(f"model: a Multibody, not {model!r:.80}")
+        raise _core.ModelError(f"model must be a Multibody, not {model!r:.80}")
     parents = [model._body(k)["parent"] for k in range(model._size)]
     if parents != list(range(-1, count - 1)):
-        raise _core.ModelError(f"{model.name!r} is no serial chain of {count} bodies, one for each time step")
+        raise _core.ModelError(f"{model.name!r} is not a serial chain of {count} bodies, one for each time step")
     return model
 
 
 def _size(a: Step, b: Step) -> float | None:
-    """Of P, the mass that it is on the average: the figure's colours."""
+    """Return the mean mass of P, which colours the figure."""
     return float(np.trace(b.value[3:, 3:])) / 3 if b.letter == "P" else None
 
 
 def _rows(x: np.ndarray) -> list[list[float | None]]:
-    """A row for each of what is measured, over time."""
+    """Return a row for each measured quantity, over time."""
     return [[float(f"{value:.6g}") if np.isfinite(value) else None for value in row] for row in x.T]

@@ -17,9 +17,9 @@ from .plane_layout import PlaneLayout, layout_of
 from .sweep_picture import HEIGHT, RADIUS, WIDTH
 
 MOST = 60
-"""Blocks a row or column: each is a square that can be pointed at."""
+"""Largest number of blocks per row or column, so that each square can be pointed at."""
 NUMBERED = 38
-"""Pixels of a square that has room for its number."""
+"""Least size, pixels, of a square with room for its number."""
 _LETTERS, _FONT = 16, 11.0
 
 
@@ -34,7 +34,7 @@ class LinkedBlocks:
     Raises
     ------
     EvaluationError
-        An operator of no model, or of rows or columns that belong to no bodies; more than 60 blocks a row or column; another `on`.
+        An operator without a model, or with rows or columns that belong to no body; more than 60 blocks per row or column; an unknown `on`.
 
     Examples
     --------
@@ -46,16 +46,16 @@ class LinkedBlocks:
     def __init__(self, view: Any, on: str = "robot"):
         operator = view.operator
         if on not in ("robot", "tree"):
-            raise _core.EvaluationError(f"on={on!r}: there are 'robot', the model as it stands, and 'tree'")
+            raise _core.EvaluationError(f"on={on!r}: choose 'robot', the model at its state, or 'tree'")
         if not operator.sources:
-            raise _core.EvaluationError(f"{operator.text()} is of no model: its blocks are shown by blocks() alone")
+            raise _core.EvaluationError(f"{operator.text()} has no model: only blocks() shows its blocks")
         source = operator.sources[0]
         if not view.rows or not view.columns:
             raise _core.EvaluationError(f"{operator.text()} has no blocks: there is nothing to point at")
         self._rows, self._columns = (_bodies_of(names, source, operator) for names in (view.rows, view.columns))
         if max(len(view.rows), len(view.columns)) > MOST:
             raise _core.EvaluationError(
-                f"{len(view.rows)} × {len(view.columns)} blocks: {MOST} a row at most can be pointed at; blocks() shows all, and those of "
+                f"{len(view.rows)} × {len(view.columns)} blocks: at most {MOST} per row can be pointed at; blocks() shows all; blocks of "
                 "model.subgraph(...) are fewer"
             )
         self._view, self._parents, self._names = view, list(source.parents), list(source.body_names)
@@ -65,7 +65,7 @@ class LinkedBlocks:
         return f"<blocks of {self._view.title} beside their robot, {len(self._view.rows)} × {len(self._view.columns)}>"
 
     def save(self, path: str | Path) -> Path:
-        """Write a page, ".html". EvaluationError for another ending, OSError if it cannot be written."""
+        """Write a page, ".html". Raises EvaluationError for another ending, OSError if the file cannot be written."""
         target = writable_target(path, (".html",), "a page")
         head = "<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><meta name='color-scheme' content='light dark'>"
         page = f"{head}<title>{escape(self._view.title)}</title><body style='margin:16px'>{self._repr_html_()}</body></html>\n"
@@ -83,7 +83,7 @@ class LinkedBlocks:
         )
 
     def _caption(self) -> str:
-        """What is seen, and what can be done: it stands below until something is pointed at."""
+        """Return the caption and instructions shown below until the user points at something."""
         numbers = "the number is its largest entry; " if self._size() >= NUMBERED else ""
         return (
             f"Each square is a block: {numbers}blue positive, orange negative, deeper where larger, blank an exact zero. Point at a block "
@@ -91,7 +91,7 @@ class LinkedBlocks:
         )
 
     def _size(self) -> float:
-        """Of a square."""
+        """Return the size of a square."""
         return float(np.clip(480 / max(len(self._view.rows), len(self._view.columns), 1), 9, 52))
 
     # ------------------------------------------------------------------ pictures
@@ -136,7 +136,7 @@ class LinkedBlocks:
 
 
 def _bodies_of(labels: list[str], source: Any, operator: Any) -> list[int]:
-    """The numbers of the bodies that labels of blocks belong to: bodies, the hinges that carry them, or nodes on them."""
+    """Return the number of the body of each label: the label is the body, its hinge, or a node on it."""
     bodies = {name: k for k, name in enumerate(source.body_names)}
     hinges = {name: k for k, name in enumerate(getattr(source, "hinge_names", ()))}
     nodes = getattr(getattr(source, "model", None), "nodes", {})
@@ -147,7 +147,7 @@ def _bodies_of(labels: list[str], source: Any, operator: Any) -> list[int]:
             body = bodies.get(nodes[label].body.name)
         if body is None:
             raise _core.EvaluationError(
-                f"{operator.text()} has a row or column {label!r} that is no body, hinge or node: blocks() shows it"
+                f"{operator.text()} has a row or column {label!r} that is not a body, hinge or node; use blocks() instead"
             )
         found.append(body)
     return found

@@ -1,4 +1,4 @@
-"""A model in HTML: what it is in a line, its tree, and its stick figure, with nothing installed but the package."""
+"""A model in HTML: a one-line summary, its tree, and its stick figure, without further packages."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .plane_layout import MOST, PlaneLayout, model_layout
 from .stick_figure import HINGES
 
 LISTED = 80
-"""Bodies of the tree that is written out."""
+"""Largest number of bodies of a tree that is printed."""
 _WIDTH, _HEIGHT, _SIZE = 420.0, 320.0, 5.5
 _SHAPES = {
     "pin": "circle", "slider": "square", "cylindrical": "square", "screw": "diamond", "planar": "diamond", "free": "triangle",
     "ball": "disc", "universal": "disc", "gimbal": "disc", "weld": "dot", "custom": "diamond",
 }  # fmt: skip
-"""Of a hinge's mark: kinds are told apart by shape and colour, and by name where one points."""
+"""Shape and colour of the mark of each kind of hinge; pointing at a mark shows the hinge's name."""
 
 
 def model_html(model: Any) -> str:
@@ -43,7 +43,7 @@ def model_html(model: Any) -> str:
 
 
 def _figure(model: Any, bodies: list[dict[str, Any]]) -> str:
-    """The sticks at the model's present state, a mark a hinge, and what the marks are."""
+    """Return the sticks at the model's present state, a mark for each hinge, and the legend."""
     at: PlaneLayout = model_layout(model, np.asarray(model.q, float), _WIDTH, _HEIGHT, 24.0, _SIZE)
     parts = [
         f"<line x1='{a[0]:.1f}' y1='{a[1]:.1f}' x2='{b[0]:.1f}' y2='{b[1]:.1f}' stroke='currentColor' stroke-opacity='.55' "
@@ -54,7 +54,7 @@ def _figure(model: Any, bodies: list[dict[str, Any]]) -> str:
     parts.append(f"<rect x='{x - 5:.1f}' y='{y - 5:.1f}' width='10' height='10' fill='currentColor'><title>base </title></rect>")
     size = _SIZE if len(bodies) < 60 else 3.0
     for (x, y), body in zip(at.bodies, bodies, strict=True):
-        title = f"{body['name']}, on {body['hinge']['kind']} {body['hinge']['name']} "  # words apart where drawings are taken out
+        title = f"{body['name']}, on {body['hinge']['kind']} {body['hinge']['name']} "  # keeps words apart when the drawing is removed
         parts.append(_mark(body["hinge"]["kind"], x, y, size, title))
     kinds = Counter(body["hinge"]["kind"] for body in bodies)
     for i, (kind, count) in enumerate(kinds.items()):

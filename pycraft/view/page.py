@@ -1,4 +1,4 @@
-"""Pictures that are a page of their own: what a notebook shows in its cell, and what is written to a file that opens offline."""
+"""Pictures that are self-contained pages: shown in a notebook's cell, or written to a file that opens offline."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ class Page:
     """
 
     HEIGHT = 480
-    """Pixels of the page in a notebook."""
+    """Height of the page in a notebook, pixels."""
 
     @cached_property
     def html(self) -> str:
         raise NotImplementedError
 
     def save(self, path: Any) -> Path:
-        """Write it to a path that ends in ".html". EvaluationError for another ending, OSError where it cannot be written."""
+        """Write it to a path that ends in ".html". Raises EvaluationError for another ending, OSError if it cannot be written."""
         target = writable_target(path, (".html",), "a page")
         target.write_text(self.html, encoding="utf-8")
         return target

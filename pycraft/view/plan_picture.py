@@ -1,4 +1,4 @@
-"""A plan in HTML: its steps with their tiers and costs, and the sweeps that it stands for, each drawn on the tree beside its equations."""
+"""A plan in HTML: its steps with their tiers and costs, and its sweeps, each drawn on the tree beside its equations."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..recursions import Pass, algorithm
 from ..tidy import bytes_text
 
 MOST = 120
-"""Bodies of a tree that is drawn."""
+"""Largest number of bodies of a tree that is drawn."""
 _STEP, _ROW, _MARGIN, _WIDEST = 34.0, 24.0, 12.0, 400.0
-"""Pixels from a body to what it carries, from leaf to leaf, around, and of the widest tree."""
+"""Pixels from a body to its children, from leaf to leaf, of the margin, and of the widest tree."""
 _CELL = "padding:3px 10px 3px 0;text-align:left;vertical-align:top"
 _NUMBER = "padding:3px 0 3px 14px;text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums"
 _INWARD, _OUTWARD = "#d55e00", "#0072b2"
-_WORDS = {(-1,): "tip to base", (1,): "base to tip", (-1, 1): "tip to base, then base to tip", (): "every body by itself"}
+_WORDS = {(-1,): "tip to base", (1,): "base to tip", (-1, 1): "tip to base, then base to tip", (): "each body separately"}
 
 
 def plan_html(explanation: Any) -> str:
-    """`Explanation._repr_html_`: the plan of an expression as a table, and its sweeps on the tree with the equations of each."""
+    """Return the plan of an expression as a table, and its sweeps on the tree with the equations of each (`Explanation._repr_html_`)."""
     expression, request = explanation.expression, explanation.request
     plan = expression.plan(request)
     order, flops = cost_words(plan)
@@ -46,7 +46,7 @@ def plan_html(explanation: Any) -> str:
 
 
 def _asked(explanation: str) -> str:
-    """What is asked of the expression, as the plan says it in its second line."""
+    """Return the request, as given in the second line of the plan."""
     lines = explanation.split("\n")
     return lines[1] if len(lines) > 1 else ""
 
@@ -55,18 +55,18 @@ def _sweeps(expression: Any, request: str) -> str:
     try:
         passes = algorithm(expression, "text", request).passes()
     except (_core.Error, ValueError) as reason:
-        return f"<div>its sweeps are not written out: {escape(str(reason))}</div>"
+        return f"<div>its sweeps are not available: {escape(str(reason))}</div>"
     cards = "".join(_card(i, one) for i, one in enumerate(passes, 1))
     return f'<div style="display:flex;flex-wrap:wrap;gap:10px;margin-top:8px">{cards}</div>' if cards else ""
 
 
 def _card(number: int, one: Pass) -> str:
-    """A pass: its number and direction, the tree with arrows along it, the equations."""
+    """Return a pass: its number and direction, the tree with arrows, the equations."""
     way = _WORDS[one.ways] if one.parents is not None else "as a whole"
     lines = "\n".join("  " * depth + text for depth, text in one.lines)
     picture = ""
     if one.parents is not None and len(one.parents) > MOST:
-        picture = f"<div>{len(one.parents)} bodies, more than are drawn</div>"
+        picture = f"<div>{len(one.parents)} bodies, too many to draw</div>"
     elif one.parents:
         picture = _tree(one, way)
     style = "border:1px solid rgba(128,128,128,.4);border-radius:4px;padding:6px 8px;max-width:100%;box-sizing:border-box"
@@ -75,7 +75,7 @@ def _card(number: int, one: Pass) -> str:
 
 
 def _tree(one: Pass, way: str) -> str:
-    """The tree on its side, its base to the left; an arrow along every link, orange to the base, blue to the tips, or both."""
+    """Return the tree on its side, its base to the left, with an arrow along every link: orange to the base, blue to the tips, or both."""
     assert one.parents is not None
     n, places = len(one.parents), tree_places(one.parents)
     depth = round(1 / places[:-1, 1].min())  # a root's place is one over the depth
@@ -100,7 +100,7 @@ def _tree(one: Pass, way: str) -> str:
 
 
 def _arrow(begin: Any, end: Any, along: float, colour: str, radius: float) -> str:
-    """An arrow's head at the middle of a link, or moved along it."""
+    """Return an arrow's head at the middle of a link, or shifted along it."""
     dx, dy = end[0] - begin[0], end[1] - begin[1]
     length = max((dx * dx + dy * dy) ** 0.5, 1e-9)
     ex, ey = dx / length, dy / length

@@ -1,4 +1,4 @@
-"""Where the bodies of a tree are drawn in a picture: on the model as it stands, or as a diagram of the tree."""
+"""Places of the bodies of a tree in a picture: on the model at its state, or as a diagram of the tree."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..models.tree_places import tree_places
 from .skeleton import Skeleton, placed
 
 MOST = 300
-"""Hinges up to which those at one place are drawn side by side: all pairs of them are looked at."""
-_AZIMUTH, _ELEVATION = -60.0, 20.0  # degrees, as figures in space are seen
+"""Largest number of hinges for which coinciding hinges are drawn side by side; the search visits all pairs."""
+_AZIMUTH, _ELEVATION = -60.0, 20.0  # degrees, as for figures in space
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class PlaneLayout:
     ----------
     bodies : (n, 2)
     base : (2,)
-    bones : (m, 2, 2) lines of the figure beside those from body to body; none of a diagram
-    owners : (m,) numbers of the bodies that the bones are fixed on at their first end, -1 the base
-    axes : (n, 2, 3) what is seen of each body's frame: rows are the picture's x and y, columns the frame's axes; None of a diagram
+    bones : (m, 2, 2) lines of the figure in addition to the lines from body to body; empty for a diagram
+    owners : (m,) numbers of the bodies at the first end of the bones, -1 the base
+    axes : (n, 2, 3) projection of each body's frame: rows are the picture's x and y, columns the frame's axes; None for a diagram
     """
 
     bodies: np.ndarray
@@ -38,8 +38,9 @@ class PlaneLayout:
 
 
 def layout_of(expression: Any, source: Any, on: str, width: float, height: float, radius: float) -> PlaneLayout:
-    """Of the bodies of a source: its model at the state that the expression is bound to, of a batch the first, else as it stands; or,
-    on="tree" and where the bodies are no model's own, a diagram of the tree."""
+    """Return the layout of the bodies of a source: its model at the state (the first of a batch) to which the expression is bound, else at
+    its present state. With
+    on="tree", or if the bodies belong to no model, a diagram of the tree."""
     model = getattr(source, "model", None)
     if on == "robot" and isinstance(model, _core.Multibody) and list(getattr(model, "bodies", ())) == list(source.body_names):
         state = getattr(expression, "_state", None)
@@ -49,19 +50,19 @@ def layout_of(expression: Any, source: Any, on: str, width: float, height: float
 
 
 def tree_layout(parents: Sequence[int], width: float, height: float, margin: float) -> PlaneLayout:
-    """Leaves side by side, a body above the middle of what it carries, the base at the foot. O(N)."""
+    """Return a diagram: leaves side by side, each body above the middle of its children, the base at the foot. O(N)."""
     x, level = tree_places(parents).T
     places = np.column_stack([margin + x * (width - 2 * margin), height - margin - level * (height - 2 * margin)])
     return PlaneLayout(places[:-1], places[-1], np.zeros((0, 2, 2)), np.zeros(0, int), None)
 
 
 def model_layout(model: Any, q: Any, width: float, height: float, margin: float, radius: float) -> PlaneLayout:
-    """The model's sticks at q, seen as `StickFigure` shows them; hinge points at one place are drawn side by side. O(N · depth)."""
+    """Return the model's sticks at q in the view of `StickFigure`; coinciding hinge points are drawn side by side. O(N · depth)."""
     return model_layouts(model, np.asarray(q, float)[None], width, height, margin, radius)[0]
 
 
 def model_layouts(model: Any, q: np.ndarray, width: float, height: float, margin: float, radius: float) -> list[PlaneLayout]:
-    """The same at several states (n, nq), all in one box: what stays where it is, stays in the picture."""
+    """Return the layouts at several states (n, nq), all in one box, so that fixed points stay fixed in the picture."""
     skeleton = Skeleton(model)
     poses = skeleton.poses(q)
     seen = _seen(skeleton, model)
@@ -91,7 +92,7 @@ def model_layouts(model: Any, q: np.ndarray, width: float, height: float, margin
 
 
 def _seen(skeleton: Skeleton, model: Any) -> np.ndarray:
-    """(2, 3): the picture's axes, right and up, in the world."""
+    """Return the picture's axes, right and up, in the world, (2, 3)."""
     flat = skeleton.normals()
     if flat:
         right, up = {1: (0, 2), 2: (0, 1), 0: (1, 2)}[next(n for n in (1, 2, 0) if n in flat)]
@@ -104,7 +105,7 @@ def _seen(skeleton: Skeleton, model: Any) -> np.ndarray:
 
 
 def _side_by_side(places: np.ndarray, apart: float) -> np.ndarray:
-    """Points nearer than `apart` to one before them go to its right; of more than `MOST` none. O(n²)."""
+    """Shift points nearer than `apart` to an earlier point to its right, if there are at most `MOST` points. O(n²)."""
     if len(places) > MOST:
         return places
     out = np.array(places)

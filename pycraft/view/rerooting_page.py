@@ -1,11 +1,11 @@
-"""One motion seen from every base body in turn: what of its numbers stays, and what belongs to the base that was chosen.
+"""One motion seen from every base body in turn: which quantities are invariant, and which depend on the chosen base.
 
-stays     poses, velocities and accelerations of bodies, energy, momentum; ln det ℳ, as coordinates change by a matrix of determinant ±1;
-          Υ(k) = J_k ℳ⁻¹ J_k*, as it is what a force on body k gives body k; the shares tr(Υ(k)M(k))
-changes   the order of the bodies and the depth of the tree, the coordinates' velocities, the condition of ℳ, P(k) and what is inboard of k
+invariant  poses, velocities and accelerations of bodies, energy, momentum; ln det ℳ, as coordinates change by a matrix of determinant ±1;
+           Υ(k) = J_k ℳ⁻¹ J_k*, the acceleration of body k by a force on body k; the shares tr(Υ(k)M(k))
+dependent  the order of the bodies and the depth of the tree, the coordinates' velocities, the condition of ℳ, P(k) and what is inboard of k
 
-A body of a free tree is felt as Υ(k)⁻¹ = P(k) + S⁺(k): P(k) of all that it carries, S⁺(k) of all that carries it. Where k is the base,
-all of it is P(k). [The two-filter form, in the catalogue of theorems "two-filter form"; A. Jain, Robot and Multibody Dynamics, Springer
+The inertia felt at a body of a free tree is Υ(k)⁻¹ = P(k) + S⁺(k): P(k) of the outboard bodies, S⁺(k) of the inboard ones. If k is the
+base, it equals P(k). [The two-filter form, in the catalogue of theorems "two-filter form"; A. Jain, Robot and Multibody Dynamics, Springer
 2011]
 """
 
@@ -26,7 +26,7 @@ from .skeleton import Skeleton
 from .web_page import web_page
 
 MOST = 60
-"""Bodies: the page has a tree and a pair of numbers a body for each of them."""
+"""Largest number of bodies: for each, the page has a tree and a pair of values per body."""
 
 
 class RerootingPage(Page):
@@ -34,13 +34,13 @@ class RerootingPage(Page):
 
     Attributes
     ----------
-    bases : list of str, bodies that can be the base: those of trees that fly freely
+    bases : list of str, bodies that can be the base: bodies of free-flying trees
     stays, changes : dict
-        By what they are of, one number for each of `bases`; of what is a vector or of all bodies, in `stays`, how far it is from what it is
-        with the first of `bases`.
+        One value for each of `bases`, by name. For vectors and quantities of all bodies, `stays` gives the distance from the value with the
+        first of `bases`.
     inverse_of_Upsilon, P : (bases, bodies of `bases`), kg
-        A third of the trace of the linear block of Υ(k)⁻¹, the mass that is felt on the average of all directions, and of P(k), what of it
-        is outboard. The rest is S⁺(k).
+        A third of the trace of the linear block of Υ(k)⁻¹, the mean mass felt over all directions, and of P(k), the outboard
+        part. The rest is S⁺(k).
     """
 
     HEIGHT = 600
@@ -52,14 +52,14 @@ class RerootingPage(Page):
         self.model.q, self.model.v = q, v
         if len(model.bodies) > MOST:
             raise _core.EvaluationError(
-                f"{len(model.bodies)} bodies: {MOST} at most are drawn with each as the base; model.subgraph(...) is a part of them"
+                f"{len(model.bodies)} bodies: at most {MOST} can be drawn with each as the base; model.subgraph(...) gives a part"
             )
         self.models = self._rerooted()
         self.bases = list(self.models)
         self._read()
 
     def _rerooted(self) -> dict[str, Any]:
-        """Copies with every body in turn as the base. ModelError, with the remedy, where none can be."""
+        """Return copies with every body in turn as the base. Raises ModelError, with the remedy, if no body can be."""
         made, refused = {}, None
         for name in self.model.bodies:
             other = copy.copy(self.model)
@@ -70,7 +70,7 @@ class RerootingPage(Page):
             else:
                 made[str(name)] = other
         if not made:
-            raise refused or _core.ModelError(f"{self.model.name!r} has no bodies: there is no base to choose")
+            raise refused or _core.ModelError(f"{self.model.name!r} has no bodies to choose a base from")
         return made
 
     def _read(self) -> None:
@@ -106,7 +106,7 @@ class RerootingPage(Page):
             "bases": [list(model.bodies).index(name) for name in self.bases], "parents": self._parents, "places": places,
             "stays": self.stays, "changes": self.changes, **{name: x.tolist() for name, x in numbers.items()},
         }  # fmt: skip
-        said = "one motion, seen from each base body; arrows go from what carries to what is carried"
+        said = "one motion, seen from each base body; arrows go from parent to child"
         return web_page("bases", model.name, data, {"said": said})
 
     def __repr__(self) -> str:
@@ -115,7 +115,7 @@ class RerootingPage(Page):
 
 
 def _seen(model: Any, bodies: list[str], bases: list[str]) -> dict[str, Any]:
-    """Numbers of one motion, bodies in the order of `bodies` whatever the tree."""
+    """Return quantities of one motion, with bodies in the order of `bodies` for every tree."""
     soa, q = model.soa, np.asarray(model.q)
     order = [list(model.bodies).index(name) for name in bodies]
     model.frames.vdot = model.forward_dynamics(tau=np.zeros(model.nv))
@@ -139,7 +139,7 @@ def _seen(model: Any, bodies: list[str], bases: list[str]) -> dict[str, Any]:
 
 
 def _depth(parents: list[Any], bodies: list[str]) -> int:
-    """Bodies on the longest path from a root."""
+    """Return the number of bodies on the longest path from a root."""
     carried = dict(zip(bodies, parents, strict=True))
 
     def level(name: Any) -> int:

@@ -4,8 +4,8 @@ share of body k          tr(Υ(k) M(k))
 share of hinge k's rotor tr(ℳ⁻¹(k,k) J(k)),  ℳ⁻¹ of the mass matrix with J in it
 together                 Σ tr(Υ(k) M(k)) + Σ tr(ℳ⁻¹(k,k) J(k)) = tr(ℳ⁻¹ (HφMφ*H* + J)) = N
 
-Υ(k) is what a force on body k gives it in acceleration, so that Υ(k) M(k) is how much of its own inertia is felt there: a body that is free
-of all others has share 6 (or as many directions as its inertia has), one that cannot move has none. [A. Jain, Robot and Multibody
+Υ(k) maps a force on body k to its acceleration, so Υ(k) M(k) is the fraction of its own inertia that is felt there: a body that is free
+of all others has share 6 (or the rank of its inertia), a body that cannot move has share 0. [A. Jain, Robot and Multibody
 Dynamics, Springer 2011, operational space inertias; the sum is the catalogue's "the bodies' shares add up to N"]
 """
 
@@ -26,13 +26,13 @@ from .sweep_picture import HEIGHT, RADIUS, WIDTH
 
 LABEL = "share of the degrees of freedom, tr Υ(k)M(k)"
 _SHOWN = 24
-"""Bodies with a line each; of more, those with the largest shares."""
+"""Largest number of bodies listed; of more, the bodies with the largest shares."""
 _COLUMNS = 256
-"""Of I, that ℳ⁻¹J is applied to at once: no N × N matrix is kept of a large model."""
+"""Columns of I to which ℳ⁻¹J is applied at once, to avoid an N × N matrix for a large model."""
 
 
 class Shares:
-    """`Multibody.dof_shares`: prints as a table, shows as a picture in a notebook; `plot` is one by Matplotlib.
+    """`Multibody.dof_shares`: prints as a table, shows as a picture in a notebook; `plot` draws it with Matplotlib.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Shares:
         self.total = self.of_bodies + self.of_rotors
 
     def plot(self, ax: Any = None, **options: Any) -> Any:
-        """The stick figure with its bodies coloured, and the colour bar; returns the axes. Options as of `Multibody.plot`."""
+        """Draw the stick figure with coloured bodies and a colour bar; return the axes. Options as for `Multibody.plot`."""
         figure = StickFigure(self.model, self.q, ax, **{"legend": False, **options})
         figure.paint(self.values, LABEL)
         figure.ax.set_title(f"{self.model.name}: {self.said}", fontsize="medium")
@@ -59,7 +59,7 @@ class Shares:
 
     @property
     def said(self) -> str:
-        """What the sum is."""
+        """The sum in words."""
         parts = f"bodies {self.of_bodies:.6g} and rotors {self.of_rotors:.6g}, " if self.of_rotors else ""
         return f"{parts}together {self.total:.6g} of N = {self.coordinates}"
 
@@ -72,7 +72,7 @@ class Shares:
         high = max((x for _, x in rows), default=0.0) or 1.0
         lines = [f"  {name:<{width}}  {x:7.4f}  {'█' * round(24 * x / high)}".rstrip() for name, x in rows]
         more = len(self.by_body) - len(rows)
-        lines += [f"  and {more} more, with less each"] if more else []
+        lines += [f"  and {more} more with smaller shares"] if more else []
         return "\n".join([f"shares of the degrees of freedom of {self.model.name!r}, tr Υ(k)M(k)", *lines, f"  {self.said}"])
 
     def _repr_html_(self) -> str:
@@ -103,7 +103,7 @@ class Shares:
 
 
 def share_values(model: Any, q: np.ndarray) -> np.ndarray:
-    """tr(Υ(k)M(k)) of every body, (n,). O(N). SingularHingeError where a D(k) is singular."""
+    """Return tr(Υ(k)M(k)) of every body, (n,). O(N). Raises SingularHingeError if a D(k) is singular."""
     n = len(model.bodies)
     if not n or not model.nv:
         return np.zeros(n)
@@ -113,7 +113,7 @@ def share_values(model: Any, q: np.ndarray) -> np.ndarray:
 
 
 def rotor_shares(model: Any, q: np.ndarray) -> float:
-    """Σ tr(ℳ⁻¹(k,k) J(k)) of all rotors; zero of a model without. Some columns at once, O(N²)."""
+    """Return Σ tr(ℳ⁻¹(k,k) J(k)) over all rotors; zero for a model without rotors. Some columns at once, O(N²)."""
     if not model.nv:
         return 0.0
     soa = model.soa

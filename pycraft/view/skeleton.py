@@ -1,14 +1,14 @@
-"""What a stick figure shows of a model: points and lines that are fixed on bodies, found once and placed for any state.
+"""Skeleton of a model: points and lines fixed on bodies, found once and placed for any state.
 
-hinge points   where a hinge's axes meet the bodies: on the side of the parent, and on that of the body that it moves
-bones          from a body's hinge point to those of its children; of a body that carries none to its nodes, or to where its mass ends
-ties           from the hinge point of a body that carries others to its nodes
+hinge points   where a hinge's axes meet the bodies: on the parent, and on the moved body
+bones          from a body's hinge point to its children's; for a body without children, to its nodes or to the end of its mass
+ties           from the hinge point of a body with children to its nodes
 slides         between the two points of a hinge that moves along its axes, or whose axes do not meet
-axes           of a hinge's first and last subhinge that has one
+axes           axes of the first and the last subhinge with an axis
 
-Where a body's mass ends: from its centre of mass c on along e, away from the hinge point, √(3 e·Se/m), half of the uniform rod that has
-the same mass and second moment along e; S = ½ tr(𝓘) 1 - 𝓘. A body with c at its hinge point has three bones through c, along the
-principal axes of S, of such lengths.
+The end of a body's mass lies beyond its centre of mass c along e, away from the hinge point, by √(3 e·Se/m), half of the uniform rod with
+the same mass and second moment along e; S = ½ tr(𝓘) 1 - 𝓘. A body with c at its hinge point has three such bones through c, along the
+principal axes of S.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from .. import _core
 from .solids import solids
 
 BASE = -1
-"""In place of a body's number."""
+"""Body number of the base."""
 _FAR = 10.0
-"""A base farther off than this many times what it carries is not shown at its origin."""
+"""A base farther from its children than this many times their extent is not shown at its origin."""
 _LEVEL = 1e-9
-"""Of a plane's normal: how far axes and points may be off it."""
+"""Tolerance on a plane's normal for axes and points."""
 
 
 class Skeleton:
@@ -40,9 +40,9 @@ class Skeleton:
     ----------
     names, kinds : of the hinges, in the bodies' order
     points : dict
-        By what they are ("joint", "node", "mass"): owners (n,), numbers of bodies, -1 the base, and places (n, 3) in their frames, m.
+        By kind ("joint", "node", "mass"): owners (n,), numbers of bodies, -1 the base, and places (n, 3) in their frames, m.
     lines : dict
-        By what they are ("bone", "tie", "slide", "ground"): the same for both ends, (n, 2) and (n, 2, 3).
+        By kind ("bone", "tie", "slide", "ground"): owners and places of both ends, (n, 2) and (n, 2, 3).
     axes : hinge (n,), owner (n,), point (n, 3), direction (n, 3)
     masses : (n,), kg, of the points "mass"
     """
@@ -67,9 +67,9 @@ class Skeleton:
         point, direction = (np.array([axis[i] for axis in self._axes]).reshape(-1, 3) for i in (2, 3))
         self.axes = hinge, owner, point, direction
 
-    # ------------------------------------------------------------------ what is fixed where
+    # ------------------------------------------------------------------ points and lines on bodies
     def _hinge(self, k: int, body: dict[str, Any]) -> tuple[int, np.ndarray]:
-        """Takes down a hinge; returns its point on the body that it moves."""
+        """Record a hinge; return its point on the moved body."""
         hinge, parent = body["hinge"], body["parent"]
         R, p = hinge["placement"]["rotation"], hinge["placement"]["position"]
         subhinges = hinge["subhinges"]
@@ -92,10 +92,10 @@ class Skeleton:
         return outboard
 
     def _bones(self, bodies: list[dict[str, Any]], nodes: list[dict[str, Any]], hinge_points: list[tuple[int, np.ndarray]]) -> None:
-        """Bones begin at hinge points, whose bodies are known now; those of bodies that carry nothing end at nodes or with the mass."""
+        """Add the bones, which begin at hinge points; for bodies without children they end at nodes or at the end of the mass."""
         self._lines["bone"] = [(hinge_points[end[0]], end) for _, end in self._lines["bone"]]
         extents = {k: _extent(body, hinge_points[k][1]) for k, body in enumerate(bodies)}
-        for (carrier, _), _ in self._lines["bone"]:  # on a free hinge nothing is carried
+        for (carrier, _), _ in self._lines["bone"]:  # a free hinge has no bone
             extents.pop(carrier, None)
         with_nodes = set()
         for node in nodes:
@@ -109,9 +109,9 @@ class Skeleton:
         for k in extents.keys() - with_nodes:
             self._lines["bone"] += [((k, start), (k, end)) for start, end in extents[k]]
 
-    # ------------------------------------------------------------------ where it is
+    # ------------------------------------------------------------------ places at a state
     def poses(self, q: np.ndarray) -> np.ndarray:
-        """Poses (..., n + 1, 4, 4) of the bodies in the world at q (..., nq); the last is that of the base, which number -1 finds."""
+        """Return poses (..., n + 1, 4, 4) of the bodies in the world at q (..., nq); the last, index -1, is the base's."""
         q = np.asarray(q, float)
         poses = np.empty((*q.shape[:-1], len(self.bodies) + 1, 4, 4))
         poses[..., BASE, :, :] = np.eye(4)
@@ -121,16 +121,16 @@ class Skeleton:
 
     @cached_property
     def solids(self) -> tuple[list[dict[str, Any]], list[str]]:
-        """Triangles of the model's shapes, and why others are not shown: see `solids`."""
+        """Return triangles of the model's shapes, and why others are not shown: see `solids`."""
         return solids(self.model)
 
     def is_loose(self) -> bool:
-        """Whether nothing holds the model: every body on the base is on a free hinge."""
+        """Return True if the model is free: every body on the base has a free hinge."""
         roots = [kind for kind, body in zip(self.kinds, self.model.description()["bodies"], strict=True) if body["parent"] < 0]
         return bool(roots) and all(kind == "free" for kind in roots)
 
     def is_grounded(self) -> bool:
-        """Whether the base is shown at its origin: unless that lies far off what it carries."""
+        """Return True if the base is shown at its origin: unless the origin is far from the bodies."""
         poses = self.poses(self.model.zero_q())
         hinges = placed(poses, *self.lines["ground"])[:, 1]
         carried = np.concatenate([hinges, *(placed(poses, *self.points[kind]) for kind in ("joint", "mass"))])
@@ -138,7 +138,7 @@ class Skeleton:
         return bool(reach == 0 or not len(hinges) or np.linalg.norm(hinges, axis=1).min() <= _FAR * reach)
 
     def normals(self) -> tuple[int, ...]:
-        """Normals (0, 1, 2 for x, y, z) of the coordinate planes that the model can never leave; none for most models."""
+        """Return normals (0, 1, 2 for x, y, z) of the coordinate planes that the model can never leave; none for most models."""
         poses = self.poses(self.model.zero_q())
         described = self.model.description()["bodies"]
         fixed = (*self.points.values(), self.lines["slide"], self.lines["ground"])
@@ -154,24 +154,24 @@ class Skeleton:
 
 
 def placed(poses: np.ndarray, owners: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Points in the world: (..., *owners.shape, 3) of places in the frames of their owners."""
+    """Return points in the world, (..., *owners.shape, 3), from places in the frames of their owners."""
     X = poses[..., owners, :, :]
     return np.einsum("...ij,...j->...i", X[..., :3, :3], places) + X[..., :3, 3]
 
 
 def turned(poses: np.ndarray, owners: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Directions in the world, of those in the frames of their owners."""
+    """Return directions in the world, from directions in the frames of their owners."""
     return np.einsum("...ij,...j->...i", poses[..., owners, :3, :3], directions)
 
 
 def _stays(subhinge: dict[str, Any], R: np.ndarray, n: int) -> bool:
-    """Whether a subhinge moves nothing out of a plane: it turns about the plane's normal, or moves along the plane."""
+    """Return True if a subhinge stays in a plane: it turns about the plane's normal, or slides along the plane."""
     along = abs((R @ subhinge["axis"])[n])
     return subhinge["kind"] == "pin" and along >= 1 - _LEVEL or subhinge["kind"] == "slider" and along <= _LEVEL
 
 
 def _extent(body: dict[str, Any], hinge_point: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Lines in the body's frame to where its mass ends; none of a body without mass."""
+    """Return lines in the body's frame to the end of its mass; none for a body without mass."""
     if not body["mass"]:
         return []
     second = (np.trace(body["inertia"]) / 2 * np.eye(3) - body["inertia"]) / body["mass"]

@@ -1,4 +1,4 @@
-"""Shapes of bodies as triangles for a page: primitives of some dozens, meshes read from their files, thinned to what a page can draw."""
+"""Shapes of bodies as triangles for a page: primitives of some dozens, and meshes from files, simplified for drawing."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ..models.shapes import Shape
 from ..progress_bar import StepProgress
 
 ROUND = 16
-"""Sides of what is round."""
+"""Number of sides of round shapes."""
 MOST = 10000
-"""Triangles of a figure: a canvas without a graphics card sorts and draws so many some twenty times a second."""
+"""Triangles of a figure: a canvas without a graphics card draws this many about twenty times a second."""
 
 
 def solids(model: Any, most: int | None = MOST) -> tuple[list[dict[str, Any]], list[str]]:
-    """Vertices (n, 3) and faces (m, 3) of the model's shapes in the frames of their bodies, and why others are not shown.
+    """Return vertices (n, 3) and faces (m, 3) of the model's shapes in the frames of their bodies, and why others are not shown.
 
-    Together some `most` triangles, of None as many as their files have. Reading many meshes shows a bar in a terminal or notebook.
+    In total about `most` triangles; with None, all triangles of the files. Reading many meshes shows a bar in a terminal or notebook.
 
-    Each is a dictionary: "of", the number of the body, -1 the base; "vertices", "faces", "colour". A shape on a body that was taken out
-    is not shown; one on a body that is lumped with another is where its node is.
+    Each shape is a dictionary: "of", the number of the body, -1 the base; "vertices", "faces", "colour". A shape on a removed body
+    is not shown; a shape on a body lumped with another is drawn at its node.
     """
     shapes = model.shapes
     if not shapes:
@@ -52,7 +52,7 @@ def solids(model: Any, most: int | None = MOST) -> tuple[list[dict[str, Any]], l
 
 
 def triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces of one shape in its own frame, m. ModelError for a mesh that is not found or cannot be read."""
+    """Return vertices and faces of one shape in its own frame, m. Raises ModelError for a mesh that is missing or unreadable."""
     if shape.kind == "box":
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(shape.size) / 2
         sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -73,7 +73,7 @@ def triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _turned(profile: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """What a line of (radius, z) sweeps about z; outsides are on the right of the line."""
+    """Return the surface that a line of (radius, z) sweeps about z, with the outside on the right of the line."""
     angles = 2 * np.pi * np.arange(ROUND) / ROUND
     vertices = np.array([(r * np.cos(a), r * np.sin(a), z) for r, z in profile for a in angles])
     thin = 1e-9 * max(r for r, _ in profile)  # a ring of one point
@@ -87,32 +87,30 @@ def _turned(profile: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]
 
 
 def _read(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    """A mesh from its file, by trimesh: STL, OBJ, PLY, OFF, glTF."""
+    """Read a mesh file with trimesh: STL, OBJ, PLY, OFF, glTF."""
     path = resolve_package(shape.file, *shape.beside)
     return _mesh(path, path.stat().st_mtime_ns, shape.file)
 
 
 @lru_cache(maxsize=64)
 def _mesh(path: Path, changed: int, called: str) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces of a file as it was at a time: pages of one model ask for the same meshes again."""
+    """Return vertices and faces of a file, cached by its modification time: pages of a model read the same meshes again."""
     try:
         import trimesh
     except ImportError:
-        raise _core.ModelError(
-            "meshes are read by the package trimesh, which is not installed: pip install 'pycraft-soa[meshes]'"
-        ) from None
+        raise _core.ModelError("meshes need the package trimesh, which is not installed: pip install 'pycraft-soa[meshes]'") from None
     try:
         mesh: Any = trimesh.load(path, force="mesh", process=False)
         vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int)
-    except Exception as error:  # whatever a reader of foreign files says
-        raise _core.ModelError(f"{called} is no mesh that trimesh reads: {str(error) or type(error).__name__}") from None
+    except Exception as error:  # readers of foreign files raise anything
+        raise _core.ModelError(f"trimesh cannot read {called} as a mesh: {str(error) or type(error).__name__}") from None
     if not len(faces) or not np.isfinite(vertices).all():
-        raise _core.ModelError(f"{called} is no mesh that can be drawn: it has no triangles, or places that are not finite")
+        raise _core.ModelError(f"{called} cannot be drawn: it has no triangles, or vertices that are not finite")
     return vertices, faces
 
 
 def _placed(shape: Shape, numbers: dict[str, int], nodes: dict[str, Any]) -> tuple[int, np.ndarray] | None:
-    """The body that a shape is on and its pose there; None where it is on nothing that is left."""
+    """Return the body that carries a shape and the shape's pose there; None if the body was removed."""
     if shape.body in numbers:
         return numbers[shape.body], shape.placement
     if shape.body not in nodes:
@@ -123,8 +121,8 @@ def _placed(shape: Shape, numbers: dict[str, int], nodes: dict[str, Any]) -> tup
 
 
 def _thinned(made: list[dict[str, Any]], most: int) -> list[dict[str, Any]]:
-    """Together some `most` triangles: meshes lose theirs, by their numbers, and primitives none."""
-    primitive = 16 * ROUND  # what one has at most
+    """Reduce to about `most` triangles: meshes lose triangles in proportion to their number, primitives none."""
+    primitive = 16 * ROUND  # most triangles of one primitive
     total = sum(len(solid["faces"]) for solid in made)
     if total <= most:
         return made
@@ -134,7 +132,7 @@ def _thinned(made: list[dict[str, Any]], most: int) -> list[dict[str, Any]]:
 
 
 def _thin(solid: dict[str, Any], most: int) -> dict[str, Any]:
-    """Vertices that share a cell of a grid become one, of coarser and coarser grids, until there are few enough triangles.
+    """Merge vertices that share a cell of a grid, coarsening the grid until there are few enough triangles.
 
     [J. Rossignac and P. Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993]
     """

@@ -1,4 +1,4 @@
-"""Stick figures: a model at a state as bones, hinges and nodes, and the same figure moved to another state without drawing it anew."""
+"""Stick figures: a model at a state as bones, hinges and nodes, which moves to another state without redrawing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .skeleton import Skeleton, placed, turned
 
 VIEWS = {"3d": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 _FLAT_VIEWS = {1: "xz", 2: "xy", 0: "yz"}
-"""Of a plane by its normal; the first is taken where there are several."""
+"""View of a plane by its normal; the first applies if there are several."""
 HINGES = {
     "pin": ("o", "#0072b2"),
     "slider": ("s", "#d55e00"),
@@ -28,30 +28,30 @@ HINGES = {
     "weld": (".", "#7f7f7f"),
     "custom": ("p", "#000000"),
 }
-"""Marker and colour of a hinge, colours told apart by colour-blind readers [Okabe and Ito 2008]; the markers tell them, too."""
+"""Marker and colour of a hinge; both distinguish the kinds, with colours for colour-blind readers [Okabe and Ito 2008]."""
 _LARGER = {"ball": 1.25, "free": 1.9, "planar": 1.2, "universal": 1.2, "gimbal": 1.2}
 _BONE, _TIE, _FLOOR = "#404040", "#8c8c8c", "#d9d9d9"
 
 
 class StickFigure:
-    """A stick figure of a model, in axes of Matplotlib.
+    """A stick figure of a model in Matplotlib axes.
 
     Parameters
     ----------
     model : Multibody
-    q : (nq,) or a State; the model's own where left out
+    q : (nq,) or a State; default: the model's own
     ax : Axes
-        In space (projection "3d") or in the plane; new ones of their own figure where left out.
+        In space (projection "3d") or in the plane; default: axes of a new figure.
     view : {"auto", "3d", "xy", "xz", "yz"}
-        What is shown of space. "auto": the plane that a flat model can never leave; space of any other.
+        View. "auto": the plane that a flat model can never leave, space for any other model.
     com : bool
-        Centres of mass: of each body, its area by its mass, and of all.
+        Show the centre of mass of each body, with an area proportional to its mass, and of the model.
     names : bool
-        Of the hinges, beside them.
+        Show the names of the hinges.
     legend : bool
-        What the markers mean, with the count of each.
+        Show the meaning and the count of each marker.
     shadow : bool
-        The bones' shadow on the floor of the box, in space: it shows where they are in depth.
+        In space, show the bones' shadow on the floor of the box, which indicates depth.
     alpha : float
         Opacity, for several figures in the same axes.
 
@@ -59,17 +59,17 @@ class StickFigure:
     ----------
     ax : Axes
     artists : list
-        Matplotlib's, all that a state moves.
+        Matplotlib artists that move with the state.
     skeleton : Skeleton
     canvas : Canvas
-        To draw lines and points of one's own, seen as the figure is.
+        For additional lines and points in the same view.
 
     Raises
     ------
     EvaluationError
-        Another view; a plane's view for axes in space, and the other way round.
+        An unknown view; a plane's view for axes in space, or the reverse.
     ModelError
-        A q that is none of this model's.
+        A q of the wrong size for the model.
 
     Examples
     --------
@@ -77,7 +77,7 @@ class StickFigure:
     >>> from pycraft.view import StickFigure
     >>> arm = pc.chain(3)
     >>> figure = StickFigure(arm, [0, 0, 0])
-    >>> moved = figure.update([0.1, 0.2, 0.3])  # the artists that moved, for Matplotlib's animations
+    >>> moved = figure.update([0.1, 0.2, 0.3])  # the moved artists, for Matplotlib's animations
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class StickFigure:
 
     # ------------------------------------------------------------------ artists
     def _draw(self, com: bool, names: bool, shadow: bool, alpha: float) -> None:
-        """Makes every artist, without places."""
+        """Create all artists, without places."""
         canvas, skeleton = self.canvas, self.skeleton
         count = max(len(skeleton.names), 1)
         size = float(np.clip(7.5 * (20 / count) ** 0.4, 2.0, 7.5))
@@ -163,14 +163,14 @@ class StickFigure:
         self.artists: list[Any] = [part.artist for part in kept] + (self._texts.artists if self._texts else [])
 
     def _mass_markers(self, size: float, alpha: float) -> list[Points]:
-        """One for each body, its area by its mass, and one for all."""
+        """Create a marker for each body, with an area proportional to its mass, and one for the model."""
         style = dict(marker="o", mfc="#f0e442", mec="k", mew=0.6, alpha=alpha, zorder=6)
         largest = self.skeleton.masses.max(initial=0.0)
         each = [self.canvas.points(ms=max(1.6 * size * np.sqrt(mass / largest), 1.5), **style) for mass in self.skeleton.masses]
         return [*each, self.canvas.points(marker="P", ms=1.9 * size, mfc="#f0e442", mec="k", mew=1.0, alpha=alpha, zorder=7)]
 
     def update(self, q: Any = None) -> list[Any]:
-        """Move the figure to q (nq,), or to the model's own; returns the artists. ModelError for a q that is none. O(N · depth)."""
+        """Move the figure to q (nq,), default the model's own; return the artists. A wrong size raises ModelError. O(N · depth)."""
         poses = self._poses = self.skeleton.poses(self._checked(self.model, q))
         ends = {kind: placed(poses, *lines) for kind, lines in self.skeleton.lines.items()}
         points = {kind: placed(poses, *at) for kind, at in self.skeleton.points.items()}
@@ -200,10 +200,12 @@ class StickFigure:
         return self.artists
 
     def paint(self, values: Any, label: str, low: float = 0.0, high: float | None = None) -> None:
-        """Colour the bodies by a number each, in their order, with a colour bar from `low` to `high` (the largest); grey: not finite."""
+        """Colour the bodies by one value each, with a colour bar from `low` to `high` (default: the largest); grey means not finite."""
         numbers = _core.real_array(values, "values")
         if numbers.shape != (len(self.skeleton.bodies),):
-            raise _core.EvaluationError(f"values {numbers.shape}: one a body of {self.model.name!r}, ({len(self.skeleton.bodies)},)")
+            raise _core.EvaluationError(
+                f"values {numbers.shape}: give one value per body of {self.model.name!r}, ({len(self.skeleton.bodies)},)"
+            )
         high = float(np.max(numbers[np.isfinite(numbers)], initial=low)) if high is None else high
         colours = [shade(x, low, high) for x in numbers]
         owners = self.skeleton.lines["bone"][0][:, 0]
@@ -228,14 +230,14 @@ class StickFigure:
         self._bar = self.ax.figure.colorbar(scale, ax=self.ax, label=label, shrink=0.7, pad=0.12 if self.canvas.columns is None else 0.03)
 
     def _base_points(self, ground: np.ndarray) -> np.ndarray:
-        """The base's origin, or the hinges that it carries far off; nothing where all that there is flies."""
+        """Return the base's origin, or its hinges if they are far away; nothing if the whole model is free."""
         if not len(ground) and self.skeleton.names:
             return ground[:, 0]
         return np.zeros((1, 3)) if self._grounded else ground[:, 1]
 
-    # ------------------------------------------------------------------ what is in view
+    # ------------------------------------------------------------------ limits of the view
     def frame(self, q: Any) -> None:
-        """Set the axes' limits so that the figure is in view at q, (nq,) or (n, nq): at every state of a motion, before it is shown."""
+        """Set the axes' limits so that the figure is in view at q, (nq,) or (n, nq): all states of a motion, before it is shown."""
         poses = self.skeleton.poses(np.asarray(q, float))
         ground = placed(poses, *self.skeleton.lines["ground"]).reshape(-1, 2, 3)
         shown = [at for kind, at in self.skeleton.lines.items() if kind != "ground"]
@@ -258,7 +260,7 @@ class StickFigure:
                 getattr(self.ax, f"set_{name}label")(f"{shown} (m)", labelpad=9 if view == "3d" else None)
 
     def _spread_names(self) -> None:
-        """Names of hinges that are at one place go below each other."""
+        """Place names of coinciding hinges below each other."""
         assert self._texts is not None
         places = placed(self.skeleton.poses(np.asarray(self.model.zero_q())), *self.skeleton.points["joint"])
         seen: dict[tuple[float, ...], int] = {}
@@ -282,7 +284,7 @@ class StickFigure:
 
 
 def _axes(view: str, model: Any) -> Any:
-    """New axes in a figure of their own; in space, the axis that gravity is nearest to is upright."""
+    """Return axes of a new figure; in space, the axis nearest to gravity is upright."""
     import matplotlib.pyplot as plt
 
     if view != "3d":

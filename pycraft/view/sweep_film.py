@@ -1,7 +1,7 @@
-"""The sweeps of an expression's plan as a film: on the model or its tree, the recursion's line lit, blocks appearing as they are computed.
+"""The sweeps of an expression's plan as a film on the model or its tree: the current line is lit, and blocks appear as they are computed.
 
-A page by itself, or a notebook's cell: pictures in SVG with some sixty lines of script, nothing from elsewhere. Where scripts do not run
-(saved notebooks that are not trusted, static pages) the last step stands, with everything computed.
+A self-contained page or a notebook's cell: SVG pictures with some sixty lines of script. Where scripts do not run
+(untrusted notebooks, static pages), it shows the last step, with everything computed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .plane_layout import layout_of
 from .sweep_picture import HEIGHT, RADIUS, WIDTH, SweepPicture, told_value
 
 MOST = 250
-"""Bodies of a film: a column of the picture each."""
+"""Largest number of bodies of a film; each is a column of the picture."""
 
 
 class SweepFilm:
@@ -27,12 +27,12 @@ class SweepFilm:
 
     Parameters
     ----------
-    expression : Operator or Scalar, of a model; at the state that it is bound to (of a batch the first), else at the model's present one
-    x : (n,) or (n, m), what an operator is applied to; ones where it is left out
+    expression : Operator or Scalar of a model, at its bound state (the first of a batch), else at the model's present state
+    x : (n,) or (n, m), argument of an operator; default: ones
     on : {"robot", "tree"}
-        The model as it stands, linear blocks of its first symmetric 6 × 6 quantity (articulated inertias) as ellipses; or a diagram
-        of the tree, which is shown for trees that are no model's, too.
-    request : as of `Operator.algorithm`
+        The model at its state, with the linear blocks of its first symmetric 6 × 6 quantity (articulated inertias) as ellipses; or
+        a diagram of the tree, which also works for trees without a model.
+    request : as for `Operator.algorithm`
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class SweepFilm:
     Raises
     ------
     EvaluationError
-        An expression of no model, of more than 250 bodies, or that computes nothing body by body; an x that it does not take; another `on`.
+        An expression without a model, with more than 250 bodies, or without steps body by body; an x of the wrong shape; an unknown `on`.
 
     Examples
     --------
@@ -54,26 +54,26 @@ class SweepFilm:
 
     def __init__(self, expression: Any, x: Any = None, on: str = "robot", request: str = "apply"):
         if on not in ("robot", "tree"):
-            raise _core.EvaluationError(f"on={on!r}: there are 'robot', the model as it stands, and 'tree'")
+            raise _core.EvaluationError(f"on={on!r}: choose 'robot', the model at its state, or 'tree'")
         self._written = algorithm(expression, "text", request)
         models = self._written._book.models
         if not models:
-            raise _core.EvaluationError(f"{expression.text()} is of no model: there is no tree to sweep over")
+            raise _core.EvaluationError(f"{expression.text()} has no model and so no tree to sweep over")
         self._parents, self._tree = list(models[0].source.parents), models[0].tree
         self._names = list(models[0].source.body_names)
         if len(self._names) > MOST:
             raise _core.EvaluationError(
-                f"a film of {len(self._names)} bodies: {MOST} at most are drawn; one of a part, model.subgraph(...), shows the same sweeps"
+                f"a film of {len(self._names)} bodies: at most {MOST} can be drawn; a part, model.subgraph(...), shows the same sweeps"
             )
         self.title = self._written.title
         self._given = x is not None
         self.steps: list[Step] = self._written.steps(x)
         if not self.steps:
-            raise _core.EvaluationError(f"{expression.text()} takes no step: nothing is computed body by body")
+            raise _core.EvaluationError(f"{expression.text()} has no steps to show: nothing is computed body by body")
         self._layout = layout_of(expression, models[0].source, on, WIDTH, HEIGHT, RADIUS)
 
     def save(self, path: str | Path) -> Path:
-        """Write a page, ".html", 10 kB and some 300 bytes a block. EvaluationError for another ending, OSError if it cannot be written."""
+        """Write a page, ".html", 10 kB and some 300 bytes per block. Raises EvaluationError for another ending, or OSError."""
         target = Path(path)
         if target.suffix != ".html":
             raise _core.EvaluationError(f"output {str(path)!r}: a film of sweeps is written to '.html'")
@@ -97,17 +97,17 @@ class SweepFilm:
         )  # fmt: skip
 
     def _caption(self, ellipses: bool) -> str:
-        """What the pictures show, for who sees them without this page."""
+        """Return a caption for readers without this documentation."""
         applied = "" if self._given else "Applied to x = (1, ..., 1). "
         shown = "Ellipses: the linear block of the first symmetric 6 × 6 quantity. " if ellipses else ""
         below = "Below: a row for each quantity, a column for each body; deeper blue where its entries are larger, 0 where all are zero."
         return f"{applied}{shown}{below}"
 
     def _told(self, step: Step) -> list[Any]:
-        """A step as the script reads it: line, lines, pass, direction, body, words."""
+        """Return a step as the script reads it: line, lines, pass, direction, body, words."""
         text = self._written.lines()[step.line][1]
         if step.body < 0:
             return [step.line, step.lines, step.number, 0, -1, text]
-        here = step.tree == self._tree  # plans may pass over others, as of a model with another root
+        here = step.tree == self._tree  # plans may visit other trees, such as a model with another root
         words = f"{self._names[step.body] if here else f'body {step.body} of another tree'}:  {text}\n{told_value(step)}"
         return [step.line, step.lines, step.number, step.direction, step.body if here else -1, words]

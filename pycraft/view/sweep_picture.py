@@ -1,4 +1,4 @@
-"""What a film of sweeps shows, in SVG: the tree with its ellipses, and a table of blocks, each marked with the step that computes it."""
+"""Pictures of a film of sweeps, in SVG: the tree with its ellipses, and a table of blocks, each marked with the step that computes it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ WIDTH, HEIGHT, RADIUS = 480.0, 360.0, 7.0
 _STRIP, _ROW, _LEFT = 900.0, 16.0, 44.0
 _LARGEST_ELLIPSE = 45.0
 _DECADES = 5.0
-_LETTERS = 16  # of a name below a column
+_LETTERS = 16  # of a column's name
 
 
 class SweepPicture:
-    """Pictures of steps over a tree. `figure` and `strip` are what is in them when all is computed."""
+    """Pictures of steps over a tree. `figure` and `strip` show the state after the last step."""
 
     def __init__(self, layout: PlaneLayout, parents: list[int], names: list[str], steps: list[Step], tree: int):
         self._layout, self._parents, self._names = layout, parents, names
@@ -25,12 +25,12 @@ class SweepPicture:
 
     @property
     def has_ellipses(self) -> bool:
-        """Whether `figure` shows an inertia."""
+        """True if `figure` shows an inertia."""
         return bool(self._ellipses())
 
     # ------------------------------------------------------------------ the tree
     def figure(self) -> str:
-        """Bodies as discs, lines to what carries them, the model's sticks behind, ellipses of inertias."""
+        """Return the tree: bodies as discs, lines to their parents, the model's sticks behind, ellipses of inertias."""
         at = self._layout
         x, y = at.base
         parts = [_line("bone", *ends) for ends in at.bones]
@@ -44,7 +44,7 @@ class SweepPicture:
         return f"<svg viewBox='0 0 {WIDTH:g} {HEIGHT:g}' role='img' aria-label='the tree'>{''.join(parts)}</svg>"
 
     def _ellipses(self) -> list[str]:
-        """What a body's inertia is along each direction: the linear block C of the first symmetric 6 × 6 quantity, half axes √."""
+        """Return ellipses of the bodies' inertias by direction: the linear block C of the first symmetric 6 × 6 quantity, half axes √."""
         axes = self._layout.axes
         if axes is None:
             return []
@@ -66,7 +66,7 @@ class SweepPicture:
 
     # ------------------------------------------------------------------ blocks
     def strip(self) -> str:
-        """A row a quantity, a column a body; a block is deeper where the logarithm of its size is larger, beside its row's largest."""
+        """Return the blocks, a row per quantity and a column per body; colour by the logarithm of size, relative to the row's largest."""
         rows = {(step.number, step.name): step.letter for _, step in self._steps}
         if not rows:
             return ""
@@ -99,7 +99,7 @@ class SweepPicture:
 
 
 def told_value(step: Step) -> str:
-    """Up to six numbers, else their shape and the largest; "= 0" where all are exactly zero."""
+    """Return up to six numbers, else their shape and the largest; "= 0" if all are exactly zero."""
     if not step.value.size:
         return ""
     if not step.value.any():
@@ -122,5 +122,5 @@ def _size(step: Step) -> float:
 
 
 def _depth(size: float, largest: float) -> float:
-    """Of a colour: none for zero, else by the logarithm."""
+    """Return the depth of a colour: zero for zero, else by the logarithm."""
     return 0.0 if size == 0 else 0.15 + 0.7 * max(0.0, 1 + np.log10(size / largest) / _DECADES)

@@ -1,4 +1,4 @@
-"""Pages that hold all that they need: no request leaves them, and their own policy forbids any but to the server that they came from."""
+"""Self-contained pages: they send no requests, and their content policy forbids any except to their own server."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ WEB = Path(__file__).parent / "web"
 
 
 def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str], *, asks: bool = False) -> str:
-    """A page of `web/NAME.html` and `web/NAME.js`, with styles, scripts and data inside.
+    """Return a page made from `web/NAME.html` and `web/NAME.js`, with styles, scripts and data inside.
 
     Parameters
     ----------
-    name : of the page, "film" of a run, "viewer", "switches" of hypotheses, "bases" of a motion, "kalman"
+    name : name of the page: "film" of a run, "viewer", "switches" of hypotheses, "bases" of a motion, "kalman"
     title : shown in the page and its tab
     data : plain data, for the script
-    texts : HTML by the names that the page has for them
-    asks : whether the page may ask the server that it came from; else it can send no request at all
+    texts : HTML by placeholder name
+    asks : True lets the page send requests to its own server; otherwise it can send none
 
     Examples
     --------
@@ -34,7 +34,7 @@ def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str],
     policy = f"default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; connect-src {own}"
     body = Template(_text(f"{name}.html")).substitute({"title": escape(title), **texts})
     held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    scripts = "\n".join(_text(f"{script}.js") for script in ("figure", "camera", "plots", name)).replace('"use strict";\n', "")
+    scripts = "\n".join(_text(f"{script}.js") for script in ("theme", "figure", "camera", "plots", name)).replace('"use strict";\n', "")
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
@@ -45,7 +45,7 @@ def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str],
 
 
 def notes(unshown: list[str]) -> str:
-    """Why shapes are not shown, as one line that opens; "" where all are."""
+    """Return why shapes are not shown, as a line that opens; "" if all are shown."""
     if not unshown:
         return ""
     lines = "".join(f"<li>{escape(line)}</li>" for line in unshown)

@@ -1,4 +1,4 @@
-"""The live viewer: a scene that plays, is moved by sliders and changed while it goes, in a page that this machine serves to itself."""
+"""The live viewer: a page, served by this machine to itself, that plays a scene, with sliders to move it and effects to change."""
 
 from .view import View, view_model, view_scene
 

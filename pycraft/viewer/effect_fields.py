@@ -1,4 +1,4 @@
-"""Parameters of effects as fields of a page: what can be shown as a number or numbers, and set again while a scene goes on."""
+"""Parameters of effects as fields of a page: numbers and lists of numbers that can be shown, and changed while a scene plays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 
 EVERY = {"hinges": "all hinges", "coordinates": "all coordinates", "bodies": "all bodies"}
-"""What an effect acts on where nothing was chosen, by the name of the field."""
+"""Text for fields that select nothing, so that the effect acts on all, by the name of the field."""
 
 
 def shown_fields(effect: Any, model: Any) -> list[dict[str, Any]]:
@@ -20,14 +20,14 @@ def shown_fields(effect: Any, model: Any) -> list[dict[str, Any]]:
 
 
 def set_field(scene: Any, effect: str, field: str, value: Any) -> None:
-    """One parameter of an effect to a number or a list of numbers. ModelError for what cannot be: the effect is then as it was."""
+    """Set a parameter of an effect to a number or a list of numbers. On ModelError the effect is unchanged."""
     changed = scene.effects[effect]
     before, present = dict(_parameters(changed.completed_for(scene.model))).get(field), getattr(changed, field, None)
     if before is None or "value" not in _shown(before, field):
-        raise _core.ModelError(f"{effect} has no number {field!r} that can be set here")
+        raise _core.ModelError(f"{effect} has no numeric parameter {field!r} that can be set here")
     given = np.asarray(_core.real_array(value, f"{effect}: {field}"))
     if given.shape != np.shape(before):
-        raise _core.ModelError(f"{effect}: {field} has the shape {np.shape(before)}, not {given.shape}")
+        raise _core.ModelError(f"{effect}: {field} takes the shape {np.shape(before)}, not {given.shape}")
     if not np.isfinite(given).all():
         raise _core.ModelError(f"{effect}: {field} takes finite numbers")
     new = type(before)(given.item()) if np.ndim(before) == 0 else given.tolist()

@@ -1,4 +1,4 @@
-"""What a user's code shows in the viewer beside the model: frames, labels, lines and shapes, in the world or on a body."""
+"""Drawings that a user's code adds to the viewer: frames, labels, lines and shapes, in the world or on a body."""
 
 from __future__ import annotations
 
@@ -16,42 +16,42 @@ from ..view.solids import triangles
 from .live_scene import LiveScene
 
 PART = 0.1
-"""Of the model's reach: the length of a frame's axes."""
+"""Length of a frame's axes, as a fraction of the model's reach."""
 _COUNTS = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3, "mesh": 3}
 
 
 class Extras:
-    """What is shown, by name.
+    """Added drawings by name.
 
     Attributes
     ----------
-    given : dict, checked, as `View.frame` and its siblings were given it
+    given : dict, the checked arguments of `View.frame` and its siblings
     """
 
     def __init__(self) -> None:
         self.given: dict[str, dict[str, Any]] = {}
 
     def set(self, live: LiveScene, extra: dict[str, Any] | None, name: str) -> None:
-        """One of them, in place of what has its name; None takes it out, without a name all. ModelError for what cannot be shown."""
+        """Add or replace the drawing of a name; None removes it, or all if the name is empty. Invalid drawings raise ModelError."""
         if extra is not None:
             self.given[name] = _checked(live, extra, name)
         elif not name:
             self.given.clear()
         elif self.given.pop(name, None) is None:
-            raise _core.ModelError(f"nothing called {name!r} is shown; there are {', '.join(map(repr, self.given)) or 'no such things'}")
+            raise _core.ModelError(f"no drawing is called {name!r}; shown: {', '.join(map(repr, self.given)) or 'nothing'}")
 
     def shown(self, skeleton: Skeleton) -> list[dict[str, Any]]:
-        """As plain data for `drawExtra` of `web/figure.js`."""
+        """Return plain data for `drawExtra` of `web/figure.js`."""
         reach = float(np.ptp(skeleton.poses(skeleton.model.zero_q())[:, :3, 3], axis=0).max()) or 1.0
         return [{**extra, "size": extra.get("size") or PART * reach} for extra in self.given.values()]
 
 
 def _checked(live: LiveScene, extra: dict[str, Any], name: str) -> dict[str, Any]:
-    """Plain data: places in the frame of a body."""
+    """Return plain data, with places in the frame of a body."""
     of, X = _carrier(live, extra["on"], name)
     colour = extra["colour"]
     if colour is not None and not (isinstance(colour, str) and re.fullmatch("#[0-9a-fA-F]{6}", colour)):
-        raise _core.ModelError(f"{name}: colour is '#rrggbb', not {colour!r:.40}")
+        raise _core.ModelError(f"{name}: colour must be '#rrggbb', not {colour!r:.40}")
     made: dict[str, Any] = {"kind": extra["kind"], "name": name, "of": of, "colour": colour}
     if extra["kind"] == "label":
         return made | {"text": text(extra["text"], "text"), "at": _moved(X, _points(extra["at"], f"{name}: at", 1))[0].tolist()}
@@ -61,7 +61,7 @@ def _checked(live: LiveScene, extra: dict[str, Any], name: str) -> dict[str, Any
     if extra["kind"] == "frame":
         size = extra["size"]
         if size is not None and not (isinstance(size, (int, float)) and 0 < size < np.inf):
-            raise _core.ModelError(f"{name}: size is a length above zero, m, not {size!r:.40}")
+            raise _core.ModelError(f"{name}: size must be a positive length in m, not {size!r:.40}")
         return made | {"at": pose[:3, 3].tolist(), "axes": pose[:3, :3].T.tolist(), "size": size}
     return made | {"solids": [_solid(extra, pose, of, name)]}
 
@@ -69,12 +69,10 @@ def _checked(live: LiveScene, extra: dict[str, Any], name: str) -> dict[str, Any
 def _solid(extra: dict[str, Any], pose: np.ndarray, of: int, name: str) -> dict[str, Any]:
     kind = extra["shape"]
     if kind not in SIZES:
-        raise _core.ModelError(f"{name}: there is no shape {kind!r:.40}; there are {', '.join(SIZES)}")
+        raise _core.ModelError(f"{name}: unknown shape {kind!r:.40}; choose from {', '.join(SIZES)}")
     size = np.atleast_1d(_core.real_array(extra["size"], f"{name}: size"))
     if size.shape != (_COUNTS[kind],) or not np.all(np.isfinite(size) & (size > 0)):
-        raise _core.ModelError(
-            f"{name}: the size of a {kind} is {SIZES[kind]}: {_COUNTS[kind]} numbers above zero, not {extra['size']!r:.60}"
-        )
+        raise _core.ModelError(f"{name}: the size of a {kind} is {SIZES[kind]}: {_COUNTS[kind]} positive values, not {extra['size']!r:.60}")
     shape = Shape("", kind, tuple(float(x) for x in size), np.eye(4), extra["colour"], str(extra["file"]))
     vertices, faces = triangles(shape)
     return {
@@ -83,7 +81,7 @@ def _solid(extra: dict[str, Any], pose: np.ndarray, of: int, name: str) -> dict[
 
 
 def _carrier(live: LiveScene, on: Any, name: str) -> tuple[int, np.ndarray]:
-    """The number of the body that something is on, -1 the world, and the pose in its frame of what it was said to be on."""
+    """Return the number of the carrying body (-1: the world), and the pose in its frame of the body or node named in `on`."""
     X = np.eye(4)
     called = getattr(on, "name", on)
     if called is None:
@@ -98,7 +96,7 @@ def _carrier(live: LiveScene, on: Any, name: str) -> tuple[int, np.ndarray]:
 
 
 def _pose(given: Any, name: str) -> np.ndarray:
-    """(4, 4) of a pose or a position; the identity of None."""
+    """Return a pose or a position as (4, 4); the identity for None."""
     X = np.eye(4)
     if given is None:
         return X
@@ -108,14 +106,14 @@ def _pose(given: Any, name: str) -> np.ndarray:
     elif x.shape == (4, 4):
         X = x
     if x.shape not in ((3,), (4, 4)) or not np.isfinite(X).all() or not np.allclose(X[:3, :3] @ X[:3, :3].T, np.eye(3), atol=1e-6):
-        raise _core.ModelError(f"{name}: a pose is (4, 4) with a rotation in it, or a position (3,), of finite numbers")
+        raise _core.ModelError(f"{name}: a pose must be a finite array (4, 4) with a rotation, or a position (3,)")
     return X
 
 
 def _points(given: Any, what: str, dimensions: int) -> np.ndarray:
     x = np.asarray(_core.real_array(given, what), float)
     if x.ndim != dimensions or x.shape[-1] != 3 or not np.isfinite(x).all():
-        raise _core.ModelError(f"{what} takes finite numbers, {'(3,)' if dimensions == 1 else '(n, 3)'}, m, not an array {x.shape}")
+        raise _core.ModelError(f"{what} takes finite values in m of shape {'(3,)' if dimensions == 1 else '(n, 3)'}, not {x.shape}")
     return np.atleast_2d(x)
 
 

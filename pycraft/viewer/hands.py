@@ -1,4 +1,4 @@
-"""A body that is held in the viewer: pushed by a spring from the pointer while the scene plays, or led there by inverse kinematics."""
+"""A body held in the viewer: a spring pushes it to the pointer while the scene plays, or inverse kinematics moves it there."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from ..scenes.effects import Wrench
 from .live_scene import LiveScene, scene_again
 
 NAME = "push"
-"""Of the effect, in a scene beside the user's own, which stays as it is."""
+"""Name of the effect. It is added to a copy of the user's scene, not to the scene itself."""
 SHARE = 0.3
-"""Of the model's reach: how far the pointer is from where it holds the model for a force of the model's weight."""
+"""Extension of the spring at which its force equals the model's weight, as a fraction of the model's reach."""
 STIFFEST = 0.1
-"""Of m/h², with m the least mass that the place moves with and h the time between two looks at the pointer: the force stands still for h,
-and an undamped spring of 4 m/h² would grow."""
+"""Largest stiffness as a fraction of m/h², with m the least effective mass at the place and h the time between two readings of the
+pointer. The force is constant during h,
+so an undamped spring of 4 m/h² would be unstable."""
 WEIGHT = 9.81
-"""m/s², of what forces are compared with."""
+"""Acceleration, m/s², that defines the weight with which forces are compared."""
 ITERATIONS = 30
 
 
@@ -34,8 +35,8 @@ class Push:
     place : (3,) m, in the body's frame
     to : (3,) m, in the world
     stiffness, damping : N/m, N s/m
-    force : (3,) N, that acts now, in the world
-    most : N, the largest until now
+    force : (3,) N, present force in the world
+    most : N, largest force so far
     """
 
     body: str
@@ -50,7 +51,7 @@ class Push:
 
     @classmethod
     def of(cls, live: LiveScene, body: str, place: np.ndarray, to: np.ndarray, seconds: float) -> Push:
-        """A spring for a scene that is looked at every `seconds` of its own time."""
+        """Return a spring for a scene that is advanced by `seconds` of its own time per update."""
         mass = _least_mass(live, body, place)
         reach = max(1e-9, float(np.ptp(live.skeleton.poses(live.q)[:, :3, 3], axis=0).max()))
         weight = WEIGHT * float(sum(live.skeleton.masses))
@@ -61,7 +62,7 @@ class Push:
         return cls(body, place, to, stiffness, 2 * np.sqrt(stiffness * mass), effect, scene)
 
     def act(self, live: LiveScene) -> None:
-        """The force at the present state, as a wrench about the body's origin."""
+        """Set the effect to the force at the present state, as a wrench about the body's origin."""
         at, velocity = _place(live, self.body, self.place)
         self.force = self.stiffness * (self.to - at) - self.damping * velocity
         self.most = max(self.most, float(np.linalg.norm(self.force)))
@@ -69,16 +70,16 @@ class Push:
         self.effect.wrench = np.concatenate([np.cross(arm, self.force), self.force])
 
     def shown(self, live: LiveScene) -> dict[str, Any]:
-        """For the page: where it acts, the force, and the largest until now."""
+        """Return the place, the force and the largest force so far, for the page."""
         return {"at": _place(live, self.body, self.place)[0].tolist(), "force": self.force.tolist(), "most": self.most}
 
 
 def lead(live: LiveScene, body: str, place: np.ndarray, to: np.ndarray) -> str:
-    """Put the scene, at rest, where a place of a body is nearest to a place in the world; return why it is not reached, "" where it is.
+    """Move the scene, at rest, so that a place of a body is nearest to a place in the world; return why it is not reached, else "".
 
-    By inverse kinematics within limits, from the present configuration alone, so that it does not jump; free hinges stay.
+    Inverse kinematics within limits starts from the present configuration only, so that the model does not jump; free hinges stay.
     """
-    model = copy.deepcopy(live.model)  # the frame that is led is no business of the user's model
+    model = copy.deepcopy(live.model)  # the added frame must not appear in the user's model
     name = "led"
     while name in model.frames:
         name += "_"
@@ -92,28 +93,28 @@ def lead(live: LiveScene, body: str, place: np.ndarray, to: np.ndarray) -> str:
 
 
 def given_place(live: LiveScene, body: Any, place: Any, to: Any) -> tuple[str, np.ndarray, np.ndarray]:
-    """The arguments of both, checked. ModelError for what is no body or no place."""
+    """Check the body and the places that `Push.of` and `lead` are given. Raises ModelError for an unknown body or an invalid place."""
     if body not in live.skeleton.bodies:
         raise _core.ModelError(f"{live.model.name!r} has no body {body!r}")
     places = [np.asarray(_core.real_array(x, what)) for x, what in ((place, "place"), (to, "to"))]
     for x, what in zip(places, ("place", "to"), strict=True):
         if x.shape != (3,) or not np.isfinite(x).all():
-            raise _core.ModelError(f"{what}: three finite numbers, m, not {x.tolist()!r:.80}")
+            raise _core.ModelError(f"{what} must be three finite numbers in m, not {x.tolist()!r:.80}")
     return str(body), places[0], places[1]
 
 
 def _place(live: LiveScene, body: str, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where a place of a body is in the world, and its velocity."""
+    """Return a body's place in the world, and its velocity."""
     X = live.model.pose(body, live.q)
     twist = live.model.jacobian(body, live.q) @ live.v
     return X[:3, :3] @ place + X[:3, 3], X[:3, :3] @ (twist[3:] + np.cross(twist[:3], place))
 
 
 def _least_mass(live: LiveScene, body: str, place: np.ndarray) -> float:
-    """A force at a place of a body over the acceleration that it gives, kg, the least of all directions: 1/λ, λ the largest of J ℳ⁻¹ J*."""
+    """Return the least effective mass at a place of a body over all directions, kg: 1/λ, λ the largest eigenvalue of J ℳ⁻¹ J*."""
     model = live.model
     J = model.jacobian(body, live.q)
-    J = J[3:] - np.cross(place, J[:3], axisb=0, axisc=0)  # of the place: v + ω × place
+    J = J[3:] - np.cross(place, J[:3], axisb=0, axisc=0)  # velocity of the place: v + ω × place
     if not J.size or not np.abs(J).max():
         raise _core.ModelError(f"{body!r} does not move: there is nothing to push")
     mobility = J @ np.linalg.solve(model.mass_matrix(live.q), J.T)

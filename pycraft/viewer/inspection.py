@@ -1,4 +1,4 @@
-"""Numbers of a scene at its present state, for the page: a body's M, P, D and frames, and the blocks of operators."""
+"""Values of a scene at its present state, for the page: a body's M, P, D and frames, and the blocks of operators."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from .live_scene import LiveScene
 LETTERS = {
     "ℳ": "MM", "ℳ⁻¹": "MM_inv", "M": "M", "P": "P", "D": "D", "φ": "phi", "ψ": "psi", "Υ": "Upsilon", "Ω": "Omega",
 }  # fmt: skip
-"""Operators whose blocks are shown, and their names in an operator set."""
+"""Operators with a block picture, and their names in an operator set."""
 _INERTIAS, _COMPLIANCES = "kg m², kg m and kg by body", "1/(kg m²), 1/(kg m) and 1/kg by body"
 UNITS = {
     "ℳ": "kg m² and kg by hinge", "ℳ⁻¹": "1/(kg m²) and 1/kg by hinge", "M": _INERTIAS, "P": _INERTIAS, "D": "kg m² and kg by hinge",
     "φ": "1 and m", "ψ": "1 and m", "Υ": _COMPLIANCES, "Ω": _COMPLIANCES,
 }  # fmt: skip
-"""What the entries of their blocks are, in SI units."""
+"""SI units of the entries of their blocks."""
 MOST = 600
-"""Rows of an operator that is formed for its picture."""
+"""Largest number of rows of an operator that is formed for its picture."""
 
 
 def body_numbers(live: LiveScene, name: str) -> dict[str, Any]:
-    """A body's hinge, pose and velocity, the diagonal blocks M, P of it and D of its hinge, and its frames. ModelError for another name.
+    """Return a body's hinge, pose and velocity, its diagonal blocks M and P, the block D of its hinge, and its frames.
+
+    Raises ModelError for an unknown name.
 
     Returns
     -------
     dict
-        "pose" X_WB (4, 4); "twist" (6,) in its own axes, angular first; "M", "P" (6, 6), "D" (n, n), None of more than MOST rows; "frames",
-        nodes on it by name with their places in it, m.
+        "pose" X_WB (4, 4); "twist" (6,) in its own axes, angular first; "M", "P" (6, 6), "D" (n, n), None beyond MOST rows; "frames",
+        nodes on the body by name, with their places in its frame, m.
     """
     model = live.model
     if name not in model.bodies:
@@ -55,14 +57,14 @@ def body_numbers(live: LiveScene, name: str) -> dict[str, Any]:
 
 
 def blocks_of(live: LiveScene, letter: str) -> dict[str, Any]:
-    """The largest entry of each block of an operator at the state: "rows", "columns", "values", "units".
+    """Return the largest entry of each block of an operator at the state: "rows", "columns", "values", "units".
 
-    EvaluationError for what is not shown.
+    Raises EvaluationError for operators that are not shown.
     """
     if letter not in LETTERS:
-        raise _core.EvaluationError(f"no blocks of {letter!r} are shown; there are {', '.join(LETTERS)}")
+        raise _core.EvaluationError(f"blocks of {letter!r} are not shown; choose from {', '.join(LETTERS)}")
     operator = getattr(live.model.soa, LETTERS[letter])
     if max(operator.shape, default=0) > MOST:
-        raise _core.EvaluationError(f"{letter} has {max(operator.shape)} rows; blocks of up to {MOST} are shown")
+        raise _core.EvaluationError(f"{letter} has {max(operator.shape)} rows; the viewer shows blocks up to {MOST} rows")
     view = operator.at(live.q).blocks()
     return {"rows": view.rows, "columns": view.columns, "values": view.largest().tolist(), "units": UNITS.get(letter, "")}

@@ -1,4 +1,4 @@
-"""A scene at a present state that goes on from there: by time, by hand, and after its effects were changed."""
+"""A scene with a present state, which advances in time, is moved by hand, and continues after its effects were changed."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ..view.figure_data import pose_rows
 from ..view.skeleton import Skeleton
 
 OPTIONS = ("integrator", "rtol", "atol", "step")
-"""What a scene's `run_options` say of how it goes on; the others are about runs as a whole."""
+"""Options of a scene's `run_options` used while it advances; the others apply only to whole runs."""
 _INSTANT = 1e-9
-"""s: of a run that is asked for nothing but what effects begin with."""
+"""Duration, s, of a run made only to get the initial states of effects."""
 _REACH, _MOST = 0.05, 200
-"""rad and m: of a step of a coordinate that loops follow; and steps at most."""
+"""Step, rad or m, of a coordinate that loops follow, and the largest number of steps."""
 
 
 class LiveScene:
-    """A scene, its present time and state, and what is shown of it.
+    """A scene, its present time and state, and the data that the page shows.
 
-    Coordinates u (nv,) are displacements from the neutral configuration on the group that configurations are on: those of pins, sliders
+    Coordinates u (nv,) are displacements from the neutral configuration on the configuration group: the coordinates of pins, sliders
     and screws themselves, rotation vectors of balls, twists of free hinges.
 
     Attributes
@@ -31,10 +31,10 @@ class LiveScene:
     scene : Scene
     t : s
     q, v : (nq,), (nv,)
-    work : J, of all effects since the state was last put somewhere
+    work : J, work of all effects since the state was last set
     skeleton : Skeleton
     pushed : Scene or None
-        In place of `scene` while a body is pushed: the same effects, and the push as the last one.
+        Scene used while a body is pushed: the effects of `scene`, followed by the push.
     """
 
     def __init__(self, scene: Any, q: Any = None, v: Any = None):
@@ -48,22 +48,22 @@ class LiveScene:
 
     @property
     def acting(self) -> Any:
-        """The scene whose effects act."""
+        """The scene with the acting effects: `pushed`, or `scene`."""
         return self.scene if self.pushed is None else self.pushed
 
     def _options(self) -> RunOptions:
-        told = {"integrator": "dopri5", "rtol": 1e-7, "atol": 1e-10, "step": None, **self.scene.run_options}
+        told = {"integrator": "auto", "rtol": 1e-7, "atol": 1e-10, "step": None, **self.scene.run_options}
         integrator, rtol, atol, step = (told[name] for name in OPTIONS)
-        normalise = "never" if integrator_named(integrator).foreign else "each step"  # quaternions would drift in an hour
+        normalise = "never" if integrator_named(integrator).foreign else "each step"  # otherwise quaternions would drift within an hour
         return RunOptions.checked(integrator, rtol, atol, step, None, normalise, energy=True)
 
-    # ------------------------------------------------------------------ where it is
+    # ------------------------------------------------------------------ the present state
     def reset(self) -> None:
-        """To the first state, at t = 0."""
+        """Return to the first state, at t = 0."""
         self.put(*self._first, t=0.0)
 
     def put(self, q: Any, v: Any, t: float | None = None) -> None:
-        """To another state; the effects' own states are as at first, and works are counted from here."""
+        """Set the state; the effects' own states restart, and works are counted from here."""
         self.model.check_q(q)
         self.q, self.v = np.array(q, float), np.array(v, float)
         self.t = self.t if t is None else t
@@ -71,19 +71,19 @@ class LiveScene:
         self.work = 0.0
 
     def put_as(self, other: LiveScene) -> None:
-        """To another's state and time, if the models have the same coordinates."""
+        """Take the state and time of another live scene, if the models have the same coordinates."""
         if self.model.nq == other.model.nq and self.model.coordinate_names == other.model.coordinate_names:
             self.put(other.q, other.v, other.t)
 
     @property
     def u(self) -> np.ndarray:
-        """(nv,) rad and m, from the neutral configuration."""
+        """Coordinates (nv,), rad and m, from the neutral configuration."""
         return self.model.difference(self.model.zero_q(), self.q)
 
     def move(self, coordinate: int, to: float) -> None:
-        """One coordinate of `u` to a value, at rest. With loops the rest follows in small steps, so that it stays on its branch.
+        """Set one coordinate of `u`, at rest. With loops the other coordinates follow in small steps, to stay on the same branch.
 
-        ModelError where the loops let it go no farther: it is then as far as it went.
+        Raises ModelError where the loops stop the motion; the state is then the last one reached.
         """
         first = self.u[coordinate]
         count = max(1, int(np.ceil(abs(to - first) / _REACH))) if len(self.model.loops) else 1
@@ -94,14 +94,14 @@ class LiveScene:
             self.put(self._on_loops(q, self._hinge_of(coordinate), starts=1), np.zeros(self.model.nv))
 
     def rest_at(self, q: np.ndarray) -> None:
-        """To a configuration, or one near it on the loops, at rest."""
+        """Set a configuration, or one near it that closes the loops, at rest."""
         self.put(self._on_loops(q, (), starts=20), np.zeros(self.model.nv))
 
     def _on_loops(self, q: np.ndarray, fix: Any, starts: int) -> np.ndarray:
         return self.model.assemble(q, np.zeros(self.model.nv), fix=fix, starts=starts).q if len(self.model.loops) else q
 
     def _hinge_of(self, coordinate: int) -> Any:
-        """What keeps a coordinate while loops are closed: itself, or of a rotation its whole hinge."""
+        """Return the coordinates to hold while loops are closed: the coordinate itself, or for a rotation all of its hinge."""
         for name, hinge in self.model.hinges.items():
             if hinge.v_slice.start <= coordinate < hinge.v_slice.stop:
                 turns = hinge.q_slice.stop - hinge.q_slice.start != hinge.v_slice.stop - hinge.v_slice.start
@@ -110,20 +110,20 @@ class LiveScene:
 
     # ------------------------------------------------------------------ time
     def advance(self, seconds: float) -> None:
-        """Go on by some seconds. What stops a run is raised, and the state is as before."""
+        """Advance by some seconds. If the run raises an error, the state is unchanged."""
         run = continued(self.acting, self.t, self.t + seconds, self.q, self.v, self.own_states(), self.options)
         self.t, self.q, self.v = float(run.t[-1]), run.q[-1], run.v[-1]
         self.work += float(run._work[-1].sum())
         self._keep(run.states[-1])
 
-    # ------------------------------------------------------------------ what is shown
+    # ------------------------------------------------------------------ data for the page
     def along(self) -> dict[str, np.ndarray]:
-        """Accelerations "vdot" (nv,), "forces" (effects, nv), "kinetic", "potential" (effects,) at the state."""
+        """Return accelerations "vdot" (nv,), "forces" (effects, nv), "kinetic", "potential" (effects,) at the state."""
         found = self.acting._calls().along(*self._row())
         return {name: x[:, 0] if name == "forces" else x[0] for name, x in found.items()}
 
     def own_states(self) -> np.ndarray:
-        """The effects' own states, one effect after the other; of those that have none yet, as they are at first."""
+        """Return the effects' own states, one effect after another; the initial states of effects that have none yet."""
         counts = self.acting._calls().states
         if not sum(counts):
             return np.zeros(0)
@@ -143,11 +143,11 @@ class LiveScene:
         return np.array([self.t]), self.q[None], self.v[None], self.own_states()[None]
 
     def poses(self) -> np.ndarray:
-        """(12 n,) rows of [R p] of the bodies."""
+        """Return the poses of the bodies, rows of [R p], (12 n,)."""
         return pose_rows(self.skeleton, self.q)
 
     def velocities(self) -> list[tuple[list[float], list[float]]]:
-        """Centres of mass and their velocities, m and m/s, in the world. O(N)."""
+        """Return centres of mass and their velocities, m and m/s, in the world. O(N)."""
         owners, places = self.skeleton.points["mass"]
         if not self.model.nv or not len(owners):
             return []
@@ -159,7 +159,7 @@ class LiveScene:
         return list(zip(at.tolist(), linear.tolist(), strict=True))
 
     def forces(self) -> list[tuple[list[float], list[float]]]:
-        """Hinge points and the forces that the hinges put on the bodies there, m and N, in the world. O(N)."""
+        """Return hinge points and the forces of the hinges on the bodies there, m and N, in the world. O(N)."""
         f = forces_of_scene(self.acting._calls(), self.model, *self._row(), None, "world", None, "whole")[0]
         owners, places = self.skeleton.points["joint"]
         poses = self.skeleton.poses(self.q)[owners]
@@ -168,12 +168,12 @@ class LiveScene:
 
 
 def without(scene: Any, name: str) -> Any:
-    """The scene with one effect off: the same model, the same effects, changed with them."""
+    """Return a scene with one effect off. It shares the model and the effects, and so follows their changes."""
     return scene_again(scene, off=name)
 
 
 def scene_again(scene: Any, off: str = "") -> Any:
-    """Another scene with the same model and effects, which change with the first one's, one of them off; more can be added to it."""
+    """Return another scene that shares the model and the effects, with one effect off; more effects can be added to it alone."""
     form, refine, residual, precision = scene._how
     other = type(scene)(scene.model, form=form, refine=refine, residual=residual, precision=precision)
     other.run_options = scene.run_options

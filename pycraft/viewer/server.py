@@ -1,7 +1,7 @@
-"""The viewer's page and its data over HTTP, for this machine unless told otherwise, and for the page's own origin alone.
+"""The viewer's page and data over HTTP, by default for this machine only, and always for the page's own origin only.
 
-Sources: W3C, Fetch Metadata Request Headers; RFC 6454 (origins). Names in `Host` are looked at, too: a foreign name that resolves to this
-machine would make a foreign page's origin the server's own (DNS rebinding).
+Sources: W3C, Fetch Metadata Request Headers; RFC 6454 (origins). The name in `Host` is also checked: a foreign name that resolves to this
+machine would turn a foreign page's origin into the server's own (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from .. import _core
 from .session import Session
 
 LONGEST = 65536
-"""Bytes of a request's body."""
+"""Largest size, bytes, of a request's body."""
 LOCAL = ("127.0.0.1", "localhost", "::1")
 FRAMES = "frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview:"
-"""Who may show the page within theirs: notebooks of this machine."""
+"""Pages that may embed the viewer: notebooks of this machine."""
 
 
 class ViewServer(ThreadingHTTPServer):
-    """Serves one session at an address; `start` returns at once.
+    """Serve one session at an address; `start` returns at once.
 
     Raises
     ------
     EvaluationError
-        A port that is taken, a host that is none of this machine's: with the remedy.
+        The port is taken, or the host is not an address of this machine; the message gives the remedy.
     """
 
     daemon_threads = True
@@ -43,44 +43,44 @@ class ViewServer(ThreadingHTTPServer):
             super().__init__((host, port), _Handler)
         except OSError as error:
             raise _core.EvaluationError(
-                f"the viewer cannot be at {host} port {port}: {error.strerror or error}; port=0 takes a free one"
+                f"the viewer cannot use {host} port {port}: {error.strerror or error}; port=0 picks a free port"
             ) from None
         self._thread = threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.1}, name="pycraft viewer, pages", daemon=True)
 
     @property
     def address(self) -> str:
-        """What to open."""
+        """Address to open in a browser."""
         name = self.given_host if self.given_host not in ("0.0.0.0", "::") else "localhost"
         return f"http://{f'[{name}]' if ':' in name else name}:{self.server_address[1]}/"
 
     @property
     def is_local(self) -> bool:
-        """Whether this machine alone can reach it."""
+        """True if only this machine can reach the server."""
         return self.given_host in LOCAL
 
     def start(self) -> None:
         self._thread.start()
 
     def close(self) -> None:
-        """No page is served any more, those that are open are told nothing."""
+        """Stop serving. Open pages get no notice."""
         self.ended = True
         self.shutdown()
         self.server_close()
         self.session.close()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A page that was closed while it was answered is no news."""
+        """Ignore connections that a page closed during the answer."""
 
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     timeout = 60
-    disable_nagle_algorithm = True  # and answers in one piece: else each waits 40 ms for an acknowledgement
+    disable_nagle_algorithm = True  # and answers in one piece: otherwise each waits 40 ms for an acknowledgement
     wbufsize = -1
     server: ViewServer
 
     def do_GET(self) -> None:
-        """The page, and what it asks for."""
+        """Answer with the page or with its data."""
         if not self._is_own():
             return
         url = urlsplit(self.path)
@@ -95,7 +95,7 @@ class _Handler(BaseHTTPRequestHandler):
             "/blocks": lambda: session.blocks(given.get("of", "")),
         }
         if url.path not in answers:
-            return self._refuse(404, f"there is no {url.path}")
+            return self._refuse(404, f"the viewer has no page {url.path}")
         self._told(answers[url.path])
 
     def do_POST(self) -> None:
@@ -105,13 +105,13 @@ class _Handler(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         if urlsplit(self.path).path != "/do" or not length.isdecimal() or int(length) > LONGEST:
             self.close_connection = True
-            return self._refuse(400, f"an action is posted to /do, in {LONGEST} bytes at most")
+            return self._refuse(400, f"post an action to /do, in at most {LONGEST} bytes")
         text = self.rfile.read(int(length))
         try:
             given = json.loads(text)
             action = given.pop("action")
         except (ValueError, KeyError, AttributeError, TypeError):
-            return self._refuse(400, 'an action is JSON: {"action": "play"}')
+            return self._refuse(400, 'an action must be JSON, such as {"action": "play"}')
 
         def done() -> dict[str, Any]:
             self.server.session.do(action, **given)
@@ -123,10 +123,12 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             self._answer(200, json.dumps(answer(), allow_nan=False).encode(), "application/json")
         except (_core.Error, ArithmeticError, KeyError) as error:
-            self._refuse(200, str(error.args[0] if isinstance(error, KeyError) else error))  # an answer: the browser has nothing to report
+            self._refuse(
+                200, str(error.args[0] if isinstance(error, KeyError) else error)
+            )  # status 200: the browser should not report an error
 
     def _is_own(self) -> bool:
-        """Whether the page asks that this server gave; others are refused before anything is done."""
+        """Return whether the request comes from a page of this server; other requests are refused before they act."""
         if self.server.ended:
             self.close_connection = True
             return False
@@ -142,7 +144,7 @@ class _Handler(BaseHTTPRequestHandler):
         if known and not foreign and not embedded:
             return True
         self.close_connection = True
-        self._refuse(403, "this viewer answers its own page alone")
+        self._refuse(403, "this viewer answers only its own page")
         return False
 
     def _refuse(self, status: int, why: str) -> None:
@@ -160,4 +162,4 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, *_: Any) -> None:
-        """Requests are no news."""
+        """Log no requests."""

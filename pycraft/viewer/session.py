@@ -1,4 +1,4 @@
-"""What a page of the viewer asks and does: one scene that plays, beside it a ghost, and what is seen of both."""
+"""Requests and actions of the viewer's pages: a scene that plays, a ghost beside it, and the data shown of both."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from .inspection import LETTERS, blocks_of, body_numbers
 from .live_scene import LiveScene, without
 
 PIECE = 1 / 60
-"""s between two looks at the clock while it plays."""
+"""Time, s, between two readings of the clock while the scene plays."""
 LATE = 0.1
-"""s of the clock that are made up for at most: a scene that cannot keep up plays slower."""
+"""Largest delay, s, that is caught up: a scene that cannot keep up plays slower."""
 UNSEEN = 10.0
-"""s without a page that asks after which it stops playing."""
+"""Time, s, without a request after which the scene stops playing."""
 SCALES = (1e-3, 1e3)
 DIRECTIONS = ("from above", "side", "front", "back", "top")
-"""Where pages look from: VIEWS of `web/figure.js`."""
+"""Directions of view: VIEWS of `web/figure.js`."""
 SEEN_STATES = 8
-"""Random ones that the first look has in view, beside the present and the neutral one."""
+"""Number of random states that the first view includes, with the present and the neutral state."""
 
 
 class Session:
-    """A scene in the viewer. Every call takes its turn: the pages' threads and the one that plays share it.
+    """A scene in the viewer. A lock serializes all calls: the pages' threads and the playing thread share the session.
 
     Parameters
     ----------
     scene : Scene
     beside : Scene, optional
-        A second one, which is drawn as a ghost and plays with it: at the same coordinates, if it has the same.
+        A second scene, drawn as a ghost, which plays along: from the same state, if its coordinates are the same.
     """
 
     def __init__(self, scene: Any, beside: Any = None, q: Any = None, v: Any = None):
@@ -62,9 +62,9 @@ class Session:
             self._set_ghost("beside")
         self._thread.start()
 
-    # ------------------------------------------------------------------ what is shown
+    # ------------------------------------------------------------------ data for the pages
     def setup(self) -> dict[str, Any]:
-        """What does not change from moment to moment: the figure, the coordinates, effects with their parameters, letters."""
+        """Return the data that do not change with time: the figure, the coordinates, effects with their parameters, letters."""
         with self.lock:
             live, model = self.live, self.live.model
             states = np.array([live.q, model.zero_q(), *self._random_states()])
@@ -81,7 +81,7 @@ class Session:
             }  # fmt: skip
 
     def _random_states(self) -> list[np.ndarray]:
-        """Configurations that the first look has in view; of what is loose where it is now, and not all over the place."""
+        """Return the configurations that the first view includes; loose bodies keep their present place in all of them."""
         live, model = self.live, self.live.model
         drawn = [np.array(model.random_state(seed).q) for seed in range(SEEN_STATES)]
         roots = [hinge.q_slice for hinge in model.hinges.values() if hinge.kind == "free"]
@@ -108,7 +108,7 @@ class Session:
         return rows
 
     def state(self, arrows: tuple[str, ...] = (), shade: str = "") -> dict[str, Any]:
-        """What changes: time, coordinates, poses, energies; where asked for, arrows of "velocity" and "force", colours by "shares"."""
+        """Return the changing data: time, coordinates, poses, energies; on request arrows "velocity" and "force", colours "shares"."""
         with self.lock:
             self._asked = time.monotonic()
             live, ghost = self.live, self.ghost
@@ -126,25 +126,25 @@ class Session:
             })  # fmt: skip
 
     def body(self, name: str) -> dict[str, Any]:
-        """Numbers of one body: M, P, D, its pose, velocity and frames."""
+        """Return the values of one body: M, P, D, its pose, velocity and frames."""
         with self.lock:
             return _finite(body_numbers(self.live, name))
 
     def blocks(self, letter: str) -> dict[str, Any]:
-        """The magnitudes of an operator's blocks."""
+        """Return the magnitudes of an operator's blocks."""
         with self.lock:
             return _finite(blocks_of(self.live, letter))
 
-    # ------------------------------------------------------------------ what is done
+    # ------------------------------------------------------------------ actions
     def do(self, action: str, **given: Any) -> None:
-        """One action by name, with what it is given. ModelError and EvaluationError, with the remedy, for what cannot be."""
+        """Do one action by name, with its arguments. Invalid actions raise ModelError or EvaluationError, with the remedy."""
         actions: dict[str, Callable[..., None]] = {
             "play": self._start, "pause": self.pause, "step": self._step, "reset": self._reset, "neutral": self._neutral,
             "random": self._random, "rest": self._rest, "move": self._move, "scale": self._set_scale, "effect": self._turn,
             "parameter": self._set, "ghost": self._set_ghost, "push": self._push_to, "let_go": self._let_go, "lead": self._lead,
         }  # fmt: skip
         if action not in actions:
-            raise _core.EvaluationError(f"the viewer has no action {action!r}; there are {', '.join(actions)}")
+            raise _core.EvaluationError(f"the viewer has no action {action!r}; choose from {', '.join(actions)}")
         with self.lock:
             self.message = ""
             try:
@@ -186,13 +186,13 @@ class Session:
         j, value = int(one_number(coordinate, "coordinate")), one_number(to, "to")
         if not 0 <= j < self.live.model.nv or not np.isfinite(value):
             raise _core.EvaluationError(
-                f"move: coordinate {coordinate} to {to}: there are {self.live.model.nv}, and they take finite numbers"
+                f"move: coordinate {coordinate} to {to}: the model has {self.live.model.nv} coordinates, which take finite values"
             )
         self.live.move(j, value)
         self._ghost_follows()
 
     def _push_to(self, body: Any, place: Any, to: Any) -> None:
-        """A spring from a place of a body to a place in the world, until it is let go; it acts while the scene plays."""
+        """Attach a spring from a place of a body to a place in the world until it is released; it acts while the scene plays."""
         name, at, goal = given_place(self.live, body, place, to)
         if self._push is None or self._push.body != name or not np.array_equal(self._push.place, at):
             self._let_go()
@@ -205,28 +205,28 @@ class Session:
         self._push = self.live.pushed = None
 
     def _lead(self, body: Any, place: Any, to: Any) -> None:
-        """A place of a body to a place in the world, by inverse kinematics, at rest."""
+        """Move a place of a body to a place in the world by inverse kinematics, at rest."""
         self.message = lead(self.live, *given_place(self.live, body, place, to))
         self._ghost_follows()
 
     def look(self, direction: Any, follow: Any, zoom: Any) -> None:
-        """Where pages look from, what their cameras follow, and how near they are, until someone moves them."""
+        """Set the direction, the followed body and the zoom of the pages' cameras, until a user moves them."""
         with self.lock:
             bodies = self.live.skeleton.bodies
             if direction not in DIRECTIONS:
-                raise _core.EvaluationError(f"direction={direction!r:.60}: there are {', '.join(map(repr, DIRECTIONS))}")
+                raise _core.EvaluationError(f"direction={direction!r:.60}: choose from {', '.join(map(repr, DIRECTIONS))}")
             called = getattr(follow, "name", follow)
             if called not in (None, "robot", *bodies):
-                raise _core.ModelError(f"follow: 'robot', a body of {self.live.model.name!r} or None, not {called!r:.60}")
+                raise _core.ModelError(f"follow takes 'robot', a body of {self.live.model.name!r} or None, not {called!r:.60}")
             near = one_number(zoom, "zoom")
             if not 0 < near < np.inf:
-                raise _core.EvaluationError(f"zoom={near:g}: a number above zero, 1 at first")
+                raise _core.EvaluationError(f"zoom={near:g}: give a positive number; the initial zoom is 1")
             followed = "" if called is None else "robot" if called == "robot" else str(bodies.index(called))
             self.camera = {"direction": direction, "follow": followed, "zoom": near, "count": self._edits}
             self._edits += 1
 
     def draw(self, extra: dict[str, Any] | None, name: str = "") -> None:
-        """Something of a user's code in the picture; None takes it out, by its name, or everything."""
+        """Add a drawing of the user's code to the picture; None removes the drawing of this name, or all."""
         with self.lock:
             self.extras.set(self.live, extra, name)
             self._edits += 1
@@ -234,7 +234,7 @@ class Session:
     def _set_scale(self, to: Any) -> None:
         value = one_number(to, "scale")
         if not SCALES[0] <= value <= SCALES[1]:
-            raise _core.EvaluationError(f"scale={value:g}: seconds of the scene in a second, from {SCALES[0]:g} to {SCALES[1]:g}")
+            raise _core.EvaluationError(f"scale={value:g}: give seconds of the scene per second, from {SCALES[0]:g} to {SCALES[1]:g}")
         self.scale = value
 
     def _turn(self, name: Any, on: Any) -> None:
@@ -261,7 +261,7 @@ class Session:
         elif not name:
             self.ghost = None
         else:
-            raise _core.ModelError(f"there is no ghost {name!r}; there are 'without EFFECT', and 'beside' where a second scene was given")
+            raise _core.ModelError(f"no ghost is called {name!r}; choose 'without EFFECT', or 'beside' if a second scene was given")
         self.ghost_name = name if self.ghost is not None else ""
         self._edits += 1
         self._ghost_follows()
@@ -301,14 +301,14 @@ class Session:
         seconds = min(elapsed, LATE) * self.scale
         try:
             self._advance(seconds)
-        except Exception as error:  # shown in the page: a thread has nobody to tell
+        except Exception as error:  # shown in the page: nobody catches errors of a thread
             self.pause()
             self.message = f"stopped at {self.live.t:.4g} s: {error}"
             return
         self.rate = 0.8 * (self.rate or self.scale) + 0.2 * seconds / max(elapsed, 1e-9)
 
     def close(self) -> None:
-        """Ends the thread that plays."""
+        """Stop the playing thread."""
         self._ended.set()
         self._wake.set()
         if threading.current_thread() is not self._thread:
@@ -316,7 +316,7 @@ class Session:
 
 
 def _arrows(live: LiveScene, kinds: tuple[str, ...]) -> tuple[dict[str, Any], list[str]]:
-    """Arrows of these kinds, and why others are missing: hinge forces of scenes that keep loops are."""
+    """Return arrows of these kinds, and why others are missing, such as hinge forces in scenes with loops."""
     made, drawn, missing = {"velocity": live.velocities, "force": live.forces}, {}, []
     for kind in kinds:
         try:
@@ -327,7 +327,7 @@ def _arrows(live: LiveScene, kinds: tuple[str, ...]) -> tuple[dict[str, Any], li
 
 
 def _shade(live: LiveScene, name: str) -> tuple[dict[str, Any] | None, list[str]]:
-    """The bodies' numbers that are shown as colours, with what they are of, and why there are none."""
+    """Return the bodies' values that are shown as colours, with their meaning, and why there are none."""
     if name != "shares":
         return None, []
     try:
@@ -340,7 +340,7 @@ def _shade(live: LiveScene, name: str) -> tuple[dict[str, Any] | None, list[str]
 
 
 def _finite(value: Any) -> Any:
-    """Plain data for JSON, which has no infinities: None in their place."""
+    """Return plain data for JSON, with None for infinities, which JSON lacks."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

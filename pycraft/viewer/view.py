@@ -1,4 +1,4 @@
-"""A scene or a model in the viewer: what `scene.view()` and `model.view()` return."""
+"""A scene or a model in the viewer: the object returned by `scene.view()` and `model.view()`."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from .server import ViewServer
 from .session import Session
 
 HEIGHT = 640
-"""Pixels of the page in a notebook."""
+"""Height of the page in a notebook, pixels."""
 
 
 class View:
-    """A page that shows a scene and plays it, at an address of this machine. A notebook shows it in its cell.
+    """A page that shows and plays a scene, at an address of this machine. A notebook shows it in its cell.
 
     It is served until `close`, the end of a `with` block, or the end of the process.
 
     Attributes
     ----------
     address : str, to open in a browser
-    is_local : bool, whether this machine alone can reach it
-    session : Session, what the page acts on
+    is_local : bool, True if only this machine can reach the page
+    session : Session, the scene that the page acts on
     """
 
     def __init__(self, scene: Any, beside: Any, q: Any, v: Any, host: Any, port: Any):
         number = whole(port, "port")
         if not 0 <= number < 65536:
-            raise _core.EvaluationError(f"port={number}: from 1 to 65535, or 0 for a free one")
+            raise _core.EvaluationError(f"port={number}: give a port from 1 to 65535, or 0 for a free one")
         name = text(host, "host")
         if beside is not None and not isinstance(beside, Scene):
-            raise _core.ModelError(f"beside: a second scene, not {beside!r:.80}")
+            raise _core.ModelError(f"beside takes a second scene, not {beside!r:.80}")
         q, v = at_state(scene.model, q, v)
         self.session = Session(scene, beside, q, v)
         setup = self.session.setup()
@@ -50,20 +50,20 @@ class View:
         self.address, self.is_local = self._server.address, self._server.is_local
         self._closed = False
         if not self.is_local:
-            warnings.warn(f"{self.said}: whoever reaches this machine can look and act", stacklevel=4)
+            warnings.warn(f"{self.said}: anyone who can reach this machine can watch and act", stacklevel=4)
         self._server.start()
 
     @property
     def said(self) -> str:
-        """Where it is, and who reaches it."""
-        return f"{self.address} ({'this machine alone' if self.is_local else f'host {self._server.given_host}: other machines, too'})"
+        """The address, and who can reach it."""
+        return f"{self.address} ({'this machine only' if self.is_local else f'host {self._server.given_host}: open to other machines'})"
 
-    # ------------------------------------------------------------------ what a user's code shows
+    # ------------------------------------------------------------------ drawings of a user's code
     def frame(self, name: str, pose: Any, on: Any = None, *, size: float | None = None) -> View:
         """Show axes x, y and z with a name, at a pose (4, 4) or a position (3,) in the world, or on a body or node; returns the view.
 
-        Another thing with this name is replaced. `size` is the length of the axes, m, a tenth of the model's where left out. ModelError for
-        what is no pose; the same of `label`, `line` and `shape`.
+        A drawing of the same name is replaced. `size` is the length of the axes, m; default: a tenth of the model's reach. Invalid poses
+        raise ModelError, here and in `label`, `line` and `shape`.
 
         Examples
         --------
@@ -75,11 +75,11 @@ class View:
         return self._shows(name, {"kind": "frame", "pose": pose, "size": size}, on, None)
 
     def label(self, text: str, at: Any, on: Any = None, *, name: str = "", colour: str | None = None) -> View:
-        """Show a text at a point (3,) in the world, or on a body or node; returns the view. `name` is the text where left out."""
+        """Show a text at a point (3,) in the world, or on a body or node; returns the view. `name` is the text by default."""
         return self._shows(name or text, {"kind": "label", "text": text, "at": at}, on, colour)
 
     def line(self, name: str, points: Any, on: Any = None, *, colour: str | None = None) -> View:
-        """Show a line through points (n, 3) in the world, or on a body or node: a path, a target's way; returns the view."""
+        """Show a line through points (n, 3) in the world, or on a body or node, such as a target's path; returns the view."""
         return self._shows(name, {"kind": "line", "points": points}, on, colour)
 
     def shape(
@@ -97,40 +97,40 @@ class View:
         Parameters
         ----------
         direction : {"from above", "side", "front", "back", "top"}
-        follow : "robot", a body or its name, which stays in the middle; None: nothing
-        zoom : 1 at first, 2 twice as near
+        follow : "robot", a body or its name, kept in the middle; None follows nothing
+        zoom : 1 at first; 2 is twice as near
 
-        EvaluationError and ModelError for others.
+        Other values raise EvaluationError or ModelError.
         """
         self.session.look(direction, follow, zoom)
         return self
 
     def remove(self, name: str) -> View:
-        """Take out what code has shown under a name. ModelError where there is none."""
+        """Remove the drawing of a name. Raises ModelError if there is none."""
         self.session.draw(None, text(name, "name"))
         return self
 
     def clear(self) -> View:
-        """Take out all that code has shown."""
+        """Remove all drawings."""
         self.session.draw(None)
         return self
 
     def shown(self) -> list[str]:
-        """The names of what code has shown."""
+        """Return the names of all drawings."""
         return list(self.session.extras.given)
 
     def _shows(self, name: Any, extra: dict[str, Any], on: Any, colour: Any) -> View:
         self.session.draw({**extra, "on": on, "colour": colour}, text(name, "name"))
         return self
 
-    # ------------------------------------------------------------------ until when
+    # ------------------------------------------------------------------ waiting and closing
     def wait(self) -> None:
-        """Until Ctrl-C, or until it is closed from elsewhere."""
+        """Wait until Ctrl-C, or until another thread closes the view."""
         while not self._closed:
             time.sleep(0.2)
 
     def close(self) -> None:
-        """The page is served no more."""
+        """Stop serving the page."""
         if not self._closed:
             self._closed = True
             self._server.close()
@@ -157,7 +157,7 @@ def view_scene(scene: Any, q: Any, v: Any, *, beside: Any, host: Any, port: Any)
 
 
 def view_model(model: Any, q: Any, v: Any, *, host: Any, port: Any) -> View:
-    """`Multibody.view`: under its own gravity, if it has one."""
+    """Return the view of a model (`Multibody.view`), under its own gravity if it has one."""
     from ..scenes.effects import Gravity
 
     scene = Scene(model)

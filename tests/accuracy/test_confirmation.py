@@ -82,6 +82,6 @@ def _moved(run, by):
 
 
 def test_every_table_with_a_reference_confirms_it():
-    """None takes one method's word: where REFERENCE is named the second is, too."""
+    """No table relies on one method: where REFERENCE is named, the second method is also named."""
     for module in (scene_accuracy, loop_comparison, tables):
         assert module.SECOND == "bulirsch-stoer" and module.confirmation is confirmation

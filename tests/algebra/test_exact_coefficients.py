@@ -53,7 +53,7 @@ def test_reciprocals_sums_and_products_of_coefficients(arm):
             assert off(wide(op, arm), exact) <= TOLERANCE, name
 
 
-@pytest.mark.parametrize("exact_rank", [True, False], ids=["rank one", "rank one but for rounding"])
+@pytest.mark.parametrize("exact_rank", [True, False], ids=["rank one", "rank one up to rounding"])
 def test_constants_of_low_rank(arm, exact_rank):
     """Kept as entries of themselves where they have that rank; numbers that have it only to a double's rounding are taken as they are."""
     H, phi, M = arm.soa("H phi M")
@@ -128,7 +128,7 @@ def test_what_text_says_is_decimal(arm):
 
 
 def test_floats_are_doubles(arm):
-    """What Python makes of 0.1 and 0.2 is no decimal, and no sum of the two is what it makes of 0.3."""
+    """Python's 0.1 and 0.2 are no decimals, and their sum is not Python's 0.3."""
     D = arm.soa.D
     assert not pc.prove(0.3 * D, 0.1 * D + 0.2 * D)
     assert pc.prove(Fraction(3, 10) * D, Fraction(1, 10) * D + Fraction(2, 10) * D)

@@ -161,7 +161,7 @@ def test_batches_are_states_one_by_one(case):
 
 
 def test_derivatives(case):
-    """Along coordinates, twice, along time, in world axes, along parameters: of ℳ, ℳ⁻¹, ln det those of the robot."""
+    """Along coordinates, twice, along time, in world axes, along parameters: derivatives of ℳ, ℳ⁻¹, ln det equal the robot's."""
     robot, soa = case
     own, n = robot.soa, robot.nv
     pairs = [((s.MM + s.J), (s.MM + s.J).inv(), (s.MM + s.J).logdet()) for s in (soa, own)]
@@ -266,7 +266,7 @@ def test_written_out(name):
 
 @pytest.mark.parametrize("name", ["branches", "coordinates apart"])
 def test_written_out_velocities_and_derivatives(name):
-    """What is made body by body within groups is given; functions of vectors by body are refused."""
+    """Operators made body by body within groups are available; functions of vectors by body are refused."""
     robot, soa = grouped(name, rotors=True)
     for op in (soa.MM.diff(2), soa.a, soa.V_bar, soa.gravity_field, soa.Delta(1), soa.H.diff(1), soa.velocity):
         written, names = op.algorithm("python", "dense" if op.shape[1] > 1 else "apply"), {"__name__": "written"}

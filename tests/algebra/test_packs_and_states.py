@@ -1,4 +1,4 @@
-"""What packs leave to their states: those without a value, pivots that others would choose; models that changed, memory, threads."""
+"""States that packs evaluate singly: without a value, pivots that others would choose; models that changed, memory, threads."""
 
 import threading
 
@@ -17,7 +17,7 @@ def arm():
 
 
 def refusal(ask):
-    """What an evaluation that is to be refused says, and as which error."""
+    """Return the message and the class of the error of an evaluation that must be refused."""
     with pytest.raises(pc.Error) as error:
         ask()
     return type(error.value), str(error.value)
@@ -122,7 +122,7 @@ def test_orders_of_pivots_that_states_disagree_about():
 
 # ---------------------------------------------------------------------- models that changed
 def test_bodies_that_come_and_go():
-    """What is bound to a model of another structure is refused, as by its states; the next operators are recorded anew."""
+    """Expressions bound to a model of another structure are refused, as by its states; the next operators are recorded again."""
     model = pc.chain(3, seed=1)
     for turn in range(3):
         Q, V = uniform_batch(model, 9)
@@ -171,7 +171,7 @@ def test_what_is_too_long_runs_state_after_state():
 
 @pytest.mark.skipif(not pc._core.__file__.endswith("linux-gnu.so"), reason="reads what the process holds from /proc")
 def test_programs_are_few():
-    """Of an expression those of the last four models and ways to ask are kept: a hundred edits take the memory of some."""
+    """The programs of an expression for the last four models and kinds of request are kept: a hundred edits take the memory of some."""
     model = pc.chain(40, seed=1)
     Q, V = uniform_batch(model, 2)
     bound, link = model.soa.MM.inv().at(Q, V), list(model.bodies)[3]

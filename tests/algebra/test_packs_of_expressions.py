@@ -87,7 +87,7 @@ def test_the_bits_of_each_state(case, form):
 
 
 def requests(model):
-    """What is asked beside products, as functions of what binds."""
+    """Requests besides products, as functions of the bound expression."""
     soa = model.soa
     MM, D = soa.MM + soa.J, soa.D
     tau = pc.vector("tau", soa.Theta)
@@ -131,7 +131,7 @@ def test_gradients_of_ln_det(case):
 
 # ---------------------------------------------------------------------- what is decided once
 def decided_once(model):
-    """What is eliminated, and blocks of several coordinates that are inverted: at one state like any other it is decided how."""
+    """Eliminations, and inverses of blocks of several coordinates: an ordinary state decides the order."""
     soa = model.soa
     MM, I, D, rng = soa.MM + soa.J, soa.I, soa.D, np.random.default_rng(3)
     A, U = rng.normal(size=(model.nv, model.nv)), rng.normal(size=(model.nv, 2))

@@ -227,7 +227,7 @@ def test_nested_shifts_of_thousands_are_solved_in_quad(chains):
     """(X⁻¹ + Y⁻¹)⁻¹ of two shifted ℳ ties two chains to each other, joint by joint.
 
     What is carried from body to body is the inertia of each chain alone, N³ for N stretched rods, and a joint feels their difference,
-    what is left where both give way: body by body a double keeps no digit of it, quad loses as many and has them. Both runs say so.
+    what is left where both give way: body by body a double keeps no digit of it, quad loses as many and has them. Both runs report it.
     """
     o, arm = chains[5000]
     arm.q = np.full(5000, 0.01)
@@ -240,7 +240,7 @@ def test_nested_shifts_of_thousands_are_solved_in_quad(chains):
     assert [note.split(":")[0] for note in wide.plan().run_notes] == ["digits"], wide.plan().run_notes
 
 
-# ---------------------------------------------------------------------- what does go dense, and says so
+# ---------------------------------------------------------------------- what does go dense, and is reported
 
 
 def test_a_full_constant_goes_dense_and_says_why():

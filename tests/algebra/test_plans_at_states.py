@@ -52,7 +52,7 @@ def test_the_plan_and_the_bits_that_it_would_have_had(name):
 
 
 def said(bound, request):
-    """A plan as text, but for what its last run did in packs: a plan that served before has a program."""
+    """Return a plan as text, except the report of its last run in packs: a plan that served before has a program."""
     return [line for line in str(bound.plan(request)).splitlines() if "in the last run: packs" not in line]
 
 

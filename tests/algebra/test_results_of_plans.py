@@ -92,7 +92,7 @@ def test_a_multiple_of_the_rotors_is_that_multiple(share):
 
 
 def test_a_solve_that_is_refined_stays_a_solve():
-    """ℳ⁻¹𝒥* goes by ψ where nothing is refined; a correction needs the solve itself."""
+    """ℳ⁻¹𝒥* is computed with ψ where nothing is refined; a correction needs the solve itself."""
     arm = pc.chain(4)
     arm.add_node("tool", "body3", position=(1, 0, 0))
     H, phi, M = arm.soa("H phi M")

@@ -1,5 +1,5 @@
 """Operators that are square in numbers while their blocks are not: the Jacobian of a node from six coordinates is 6 × 6, and has blocks of
-6 × 1. Diagonal, trace, ln|det| and all else are those of the dense matrix.
+6 × 1. Diagonal, trace, ln|det| and all else equal the dense matrix's.
 
 Tolerances: an entry of the dense matrix carries at most 200 ε of its norm (a sweep over a dozen bodies); ln|det A| moves by tr(A⁻¹δA), at
 most √n ‖A⁻¹‖ ‖δA‖.
@@ -121,7 +121,7 @@ def test_what_is_triangular_by_blocks_has_an_inverse_that_is_not():
 
 
 def test_blocks_that_are_not_square_have_no_inverse():
-    """blockdiag(𝒥) keeps one column of six: singular, and said so."""
+    """blockdiag(𝒥) keeps one column of six: singular, and reported."""
     model = arm(["pin"] * 6)
     blocks = pc.blockdiag(model.soa.Jacobian(list(model.bodies)[-1]))
     np.testing.assert_allclose(blocks.diagonal(), np.diag(blocks.dense()), atol=1e-15)

@@ -1,4 +1,4 @@
-"""What is asked of ℳ⁻¹, Ω and Λ as a whole (ln det, trace, diagonal, blocks) comes from the Riccati sweep, in every form."""
+"""Requests for ℳ⁻¹, Ω and Λ as a whole (ln det, trace, diagonal, blocks) use the Riccati sweep, in every form."""
 
 import mpmath
 import numpy as np

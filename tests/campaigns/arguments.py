@@ -2,7 +2,7 @@
 
 `python tests/campaigns/arguments.py --seeds 2000`. A round draws an entry of the public interface (constructors, setters, direct calls)
 and replaces some arguments by what does not belong there: text, dates, complex numbers, wrong shapes, NaN, infinities, reflections,
-scalings, objects, huge integers. Accepted values are read back and the mass matrix is that of the dense oracle.
+scalings, objects, huge integers. Accepted values are read back and the mass matrix is compared with the dense oracle.
 """
 
 import sys
@@ -197,7 +197,7 @@ def one_round(model, rng, name):
 
 
 def run(seeds, rounds=90):
-    """What is wrong, one line each, the same once."""
+    """Return the errors, one line each, without repetition."""
     wrong = {}
     for seed in seeds:
         rng = np.random.default_rng(seed)

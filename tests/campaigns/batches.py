@@ -1,7 +1,7 @@
 """Batches against the states one by one: random expressions, every request, bit for bit.
 
 An expression is drawn from the grammar of `random_formulas`, often with something in it that cancels by a theorem (X - X, 0 X,
-D D⁻¹, φ⁻¹ + E, blockdiag φ, the two factors of I), so that the plan hangs on no state any more or on a part of them. Whatever is
+D D⁻¹, φ⁻¹ + E, blockdiag φ, the two factors of I), so that the plan no longer depends on a state, or depends on a part of them. Whatever is
 asked of it at a batch of states must be what is asked at each state, to the last bit: same plan, same steps, same order.
 
     python tests/campaigns/batches.py --seeds 2000
@@ -87,7 +87,7 @@ def vanishing(rng, soa, e):
 
 
 def outcome(ask):
-    """What a request gives: an array, or the kind of its refusal."""
+    """Return the result of a request: an array, or the kind of its refusal."""
     try:
         return np.asarray(ask(), float)
     except (pc.Error, ZeroDivisionError) as error:
@@ -128,7 +128,7 @@ def requests(e, rng, nv):
 
 
 def check(seed):
-    """How many comparisons there were at one seed, and the differences, as text."""
+    """Return the number of comparisons at one seed, and the differences, as text."""
     rng = np.random.default_rng(seed)
     model = random_tree(rng, int(rng.integers(1, 5)), kinds=["pin", "slider", "ball", "universal", "screw"])
     soa = model.soa

@@ -1,4 +1,4 @@
-"""What the campaigns have in common as commands."""
+"""Command lines of the campaigns: their common part."""
 
 import argparse
 import time

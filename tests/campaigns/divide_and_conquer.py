@@ -1,9 +1,9 @@
-"""What divide and conquer costs beside the articulated method on this machine: writes docs/divide_and_conquer.md.
+"""Cost of divide and conquer and of the articulated method on this machine: writes docs/divide_and_conquer.md.
 
     python tests/campaigns/divide_and_conquer.py [--page docs/divide_and_conquer.md] [--largest 1000000] [--rounds 5]
 
 Forward dynamics of one state of a chain, a balanced tree and a comb of pins, 10² to 10⁶ links, on one thread and on two; the best of so
-many rounds. The bits of both numbers of threads are compared, and the values with those of the articulated method.
+many rounds. The bits of both numbers of threads are compared, and the values with the articulated method's.
 """
 
 import argparse

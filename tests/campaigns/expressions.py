@@ -46,7 +46,7 @@ ELIMINATED = 1e8 * EPS
 residual corrects, may lose as many."""
 REQUESTS = ("dense", "apply", "columns", "transposed", "diagonal", "trace", "logdet", "norm", "blockdiag", "solve", "gradient", "product")
 EXPRESSIONS = 40
-"""Of each seed."""
+"""Results of each seed."""
 
 
 # ---------------------------------------------------------------------- expressions with their dense values
@@ -64,7 +64,7 @@ class Tried:
 
     @property
     def useful(self):
-        """Whether the bound says anything."""
+        """Check that the bound is meaningful."""
         size = self.size
         return bool(np.isfinite(self.value).all() and (size < 1e9).all() and (size > 1e-9).all() and (self.error < 1e-6 * size).all())
 
@@ -147,7 +147,7 @@ def drawn_states(model, rng, count):
 
 
 def attempted(make):
-    """What it makes, or nothing where the package refuses by name."""
+    """Return its value, or None where the package refuses by name."""
     try:
         return make()
     except (pc.Error, ArithmeticError, AttributeError):
@@ -268,7 +268,7 @@ def grown(pool, rng):
 
 
 def check(kind, tried, bound, options, rng, batch):
-    """What the package says beside what NumPy does: (difference, allowed), both arrays or numbers, or nothing where it does not apply.
+    """Return the package's value beside NumPy's: (difference, allowed), both arrays or numbers, or nothing where it does not apply.
 
     `bound`: the expression at the states, those of `tried` first; `batch`: how many, None where there is one.
     """

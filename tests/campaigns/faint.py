@@ -1,4 +1,4 @@
-"""What hardly resists along one coordinate: bobs, thin rods and their like, with I/mc² from 1e-8 to 1e-28.
+"""Bodies with hardly any inertia along one coordinate: bobs, thin rods and their like, with I/mc² from 1e-8 to 1e-28.
 
 A body whose inertia about a line through its hinge is a share of what it has across, on a ball, gimbal, universal, free hinge,
 three pins in a row or a pin along that line; at the root or hung from a link, alone or with a body beyond; along an axis of

@@ -142,7 +142,7 @@ def one_round(seed, folder):
 
 
 def run(seeds):
-    """What is wrong, one line each."""
+    """Return the errors, one line each."""
     with tempfile.TemporaryDirectory() as folder:
         return [text for seed in seeds if (text := one_round(seed, folder))]
 

@@ -109,7 +109,7 @@ def one_round(rng, model, name):
 
 
 def run(seeds, rounds=36):
-    """What is wrong, one line each."""
+    """Return the errors, one line each."""
     wrong = []
     for seed in seeds:
         rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ meet the hypotheses of the proof. Says every minute how far it is, what was not 
 where anything false was. With --to, what came of each seed is a line of that file, and seeds that are there already are not run again.
 
 A seed is 3.4 statements and 0.7 s of a core in the mean, 0.09 s in the median: the slowest twelfth takes four fifths of the time. With
-`--each 12` the quick ones are perturbed more often (which these are hangs on the machine): a seed is then 9.8 statements and 0.9 s, so that
+`--each 12` the quick ones are perturbed more often (depending on the machine): a seed is then 9.8 statements and 0.9 s, so that
 10⁵ perturbed ones are 11500 seeds and three hours of a core. Measured on a busy machine of four cores.
 """
 
@@ -34,15 +34,15 @@ from support.perturbations import dense, exchanges, nodes, replaced
 from support.random_identities import J0, identity_pair, meeting, tree
 
 BOUND = 1e-7
-"""What a proved statement may be off by, relative to its sides, on small models: their condition is below 1e6."""
+"""Allowed error of a proved statement, relative to its sides, on small models: their condition is below 1e6."""
 
 REDUCED = {"trace": np.trace, "norm": np.linalg.norm, "logdet": lambda X: np.linalg.slogdet(X)[1]}
-"""What a statement may be about besides its operators, and what that is by dense NumPy."""
+"""Further subjects of a statement besides its operators, with their values in dense NumPy."""
 
 
 @dataclass
 class Tally:
-    """What came of the statements."""
+    """Results of the statements."""
 
     true: int = 0
     proved: int = 0
@@ -126,7 +126,7 @@ def number_of(operand, reduction, operators):
 
 
 def is_false(proof, lhs, rhs, reduction):
-    """Whether a proved statement fails on a model that meets its hypotheses and on which every inverse in it exists."""
+    """Check for a failure of a proved statement on a model that meets its hypotheses and on which every inverse in it exists."""
     for seed in (1, 2):
         model = meeting(proof.hypotheses, seed)
         model.q = model.random_state(seed).q
@@ -145,7 +145,7 @@ AT_LEAST, QUICK = 3, 0.1
 
 
 def tried(seed, each=AT_LEAST):
-    """What came of one seed."""
+    """Return the results of one seed."""
     tally, begin = Tally(), time.process_time()
     lhs, rhs, kind, hypotheses, soa = statement(seed)
     proof_begin = time.process_time()
@@ -171,7 +171,7 @@ def tried(seed, each=AT_LEAST):
 
 
 def run(seeds):
-    """What came of these seeds together."""
+    """Return the results of these seeds together."""
     return functools.reduce(Tally.add, map(tried, seeds), Tally())
 
 
@@ -185,7 +185,7 @@ def _seldom_collected():
 
 
 def known(path):
-    """What a file says of seeds: a line each, the last of which may have been cut off."""
+    """Return the seeds in a file, one per line; the last line may be cut off."""
     found = {}
     for line in path.read_text().splitlines() if path is not None and path.exists() else ():
         try:

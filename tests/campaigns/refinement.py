@@ -7,7 +7,7 @@ form, number of corrections and residual:
 
 - the refined value is at most WORSE times as far from the truth as the unrefined one, or within ROUNDINGS √n of it;
 - the error that `refinement` reports is at least a tenth of the true one, or the value is within that;
-- the first holds for calls and (ℳ + J)⁻¹x, by recognition, and (ℳ + D)⁻¹x, by realization, too; they report none.
+- the first holds for calls and (ℳ + J)⁻¹x, by recognition, and (ℳ + D)⁻¹x, also by realization; they report none.
 """
 
 import argparse
@@ -195,7 +195,7 @@ def solves(seed, forms=FORMS, ways=WAYS, largest=20):
 
 
 def pose_rounding(multibody, q, x, form, way, name):
-    """What the direct call says that refinement leaves of (ℳ+J)⁻¹x, None of another operator: expressions report nothing."""
+    """Return the error that the direct call reports for refined (ℳ+J)⁻¹x, None for another operator: expressions report nothing."""
     if name != "ℳ+J" or form != "fast":
         return None
     still = pc.Multibody.from_description(multibody.description() | {"gravity": np.zeros(3)})
@@ -208,12 +208,12 @@ def pose_rounding(multibody, q, x, form, way, name):
 
 
 def faults(row):
-    """What is wrong with a row: "spoiled", "understated", or nothing."""
+    """Return the error of a row: "spoiled", "understated", or nothing."""
     if row["refused"]:
         return
     rounding = ROUNDINGS * np.sqrt(row["n"]) * row["size"]
     # Kernels (cpp/kernels) round poses in frames of their own, and no residual sees that: of two values as good as poses are, the plain
-    # form may have the luckier one, and refinement the other. What it reports says so.
+    # form may have the luckier one, and refinement the other. Its report shows it.
     left = row["reported"] if row["reported"] is not None else row.get("poses")
     lucky = row["form"] == "fast" and left is not None and row["refined"] <= left
     if row["refined"] > max(WORSE * row["unrefined"], rounding) and not lucky:

@@ -1,4 +1,4 @@
-"""What refuses: requests of ℳ⁻¹, Ω and Λ as a whole beside ℳ⁻¹x, and the elimination of ℳ typed without a J that the model has.
+"""Refusals: requests of ℳ⁻¹, Ω and Λ as a whole beside ℳ⁻¹x, and the elimination of ℳ typed without a J that the model has.
 
 A model is drawn from a seed: a random tree of hinges of every kind, masses, lengths and rotor inertias over many decades. ln det, trace,
 diagonal and blocks come from the sweep that ℳ⁻¹x comes from, in every form, so they refuse where it does and nowhere else. HφMφ*H*
@@ -97,7 +97,7 @@ def scaled_condition(model):
 
 
 def eliminated(seed):
-    """Whether (HφMφ*H*)⁻¹x beside rotor inertias refuses, and the condition of the scaled ℳ."""
+    """Return if (HφMφ*H*)⁻¹x beside rotor inertias is refused, and the condition of the scaled ℳ."""
     model = drawn(seed, rotors=True)
     H, phi, M = model.soa("H phi M")
     inverse = (H @ phi @ M @ phi.T @ H.T).inv()

@@ -1,8 +1,8 @@
 """Units do not matter: one model in many units, every request that is eliminated over the tree.
 
 A model is drawn from a seed and built again with its masses multiplied by one power of two and its lengths by another. Every number of
-the one is then a power of two times that of the other, so answers made dimensionless must be the same to the last bit: pivots,
-refusals and the number of corrections may hang on nothing else. And in units far from SI's they must be right: the reference is the
+one is then a power of two times the other's, so answers made dimensionless must be the same to the last bit: pivots,
+refusals and the number of corrections may depend on nothing else. And in units far from SI's they must be right: the reference is the
 dense matrix inverted in 60 digits.
 
     python tests/campaigns/units.py --seeds 500
@@ -21,7 +21,7 @@ import pycraft as pc
 from pycraft.accuracy.hard_cases.cases_elimination import UNITS
 
 LENGTHS = {"pin": (0,), "slider": (1,), "cylindrical": (0, 1), "ball": (0, 0, 0), "universal": (0, 0)}
-"""Of each coordinate: the power of a length in it."""
+"""Return the power of a length in each coordinate."""
 
 POWERS = ((4, 0), (1, 0), (-81, 0), (0, 21), (0, -33), (-84, -33), (21, 10))
 """Binary exponents of masses and lengths."""
@@ -57,7 +57,7 @@ class Moving:
         "ball": (0, 0, 0),
         "free": (0, 0, 0, 1, 1, 1),
     }
-    """Of each velocity: the power of a length in it."""
+    """Return the power of a length in each velocity."""
 
     def __init__(self, seed, mass=1.0, length=1.0, time=1.0):
         rng = np.random.default_rng(seed)
@@ -189,7 +189,7 @@ def differing_bits_in_motion(seed):
 def differing_bits(seed):
     """(masses' exponent, lengths' exponent, request) of every answer that is not the same to the bit.
 
-    But for ln det, a difference of logarithms of numbers with units: each of them rounds.
+    Except ln det, a difference of logarithms of numbers with units: each of them rounds.
     """
     reference = Drawn(seed).answers()
     wrong = []

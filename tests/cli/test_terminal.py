@@ -46,7 +46,7 @@ def test_the_report_of_theorems_fits():
 
 
 def test_one_line_a_theorem_verdict_first():
-    """Of every theorem of the catalogue, whatever was found; nothing is cut, none goes on in a second line."""
+    """Every theorem of the catalogue has one line, whatever was found; nothing is cut or wrapped."""
     soa = pc.tree([-1, 0, 0], ["free", "ball", "pin"], seed=1, rotor_inertia=True).soa
     every = ["J = 0", "serial chain", "single-DOF hinges", "constant H", "free root"]
     for verdict, unmet in (("holds", []), ("expected to fail", every[:1]), ("holds anyway", every)):
@@ -129,7 +129,7 @@ def test_letters_are_spelled_in_one_way(text):
 
 
 def test_every_letter_has_a_spelling_that_reads_back():
-    """What is shown in a terminal can be typed again."""
+    """Text shown in a terminal can be typed again."""
     soa = pc.tree([-1, 0], ["ball", "universal"], seed=1).soa
     for name, shown in ((s.name, s.text) for s in pc._core.symbols if s.takes == "nothing"):
         typed = monospace(shown)

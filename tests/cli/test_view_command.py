@@ -19,7 +19,7 @@ runner = CliRunner()
 
 @pytest.fixture
 def shown(monkeypatch):
-    """What would be waited for."""
+    """The event that the command would wait for."""
     seen = []
     monkeypatch.setattr(View, "wait", lambda view: seen.append((view, view.session.setup(), view.session.live.q.tolist())))
     monkeypatch.setattr("webbrowser.open", lambda address: seen.append(address))
@@ -30,7 +30,7 @@ def test_a_robot_with_effects(shown):
     result = runner.invoke(app, ["view", "panda", "--effect", "gravity", "--effect", "damping:0.5", "--seed", "3"])
     assert result.exit_code == 0, result.output
     address, (view, setup, q) = shown
-    assert address == view.address and f"panda at {address} (this machine alone); Ctrl-C ends it" in result.output
+    assert address == view.address and f"panda at {address} (this machine only); Ctrl-C ends it" in result.output
     assert [effect["name"] for effect in setup["effects"]] == ["gravity", "damping"]
     assert q == pc.robots.panda().random_state(3).q.tolist() and repr(view).endswith("closed>")
 

@@ -158,7 +158,7 @@ def test_edits_do_not_show():
     before = model.mass_matrix([0.1, 0.2])
     model.bodies["body1"].mass = 7.0
     np.testing.assert_allclose(compiled(np.array([0.1, 0.2])), before, rtol=1e-14)
-    np.testing.assert_allclose(compiled([0.1, 0.2]), before, rtol=1e-14)  # the ordinary way, too
+    np.testing.assert_allclose(compiled([0.1, 0.2]), before, rtol=1e-14)  # also by the ordinary call
     assert not np.allclose(model.mass_matrix([0.1, 0.2]), before)
 
 
@@ -182,7 +182,7 @@ def test_what_cannot_be_compiled():
     heavy.add_body("ball", hinge="ball", mass=1.0, inertia=np.eye(3), rotor_inertia=[1.0, 0, 0])
     with pytest.raises(pc.ModelError, match="rotor"):
         heavy.compile("forward_dynamics")
-    with pytest.raises(pc.EvaluationError, match="straight lines"):
+    with pytest.raises(pc.EvaluationError, match="straight-line code"):
         pc.chain(400, seed=1).compile("mass_matrix")
 
 
@@ -198,9 +198,9 @@ def test_a_library_is_built_once():
 @pytest.mark.parametrize(
     ("variable", "value", "message"),
     [
-        ("CXX", "no-such-compiler", "CXX='no-such-compiler' is no command"),
+        ("CXX", "no-such-compiler", "CXX='no-such-compiler' is not a command"),
         ("PATH", "", "no C.. compiler is on the path"),
-        ("CXX", f"{sys.executable} -c 'raise SystemExit(3)'", "does not build the source"),
+        ("CXX", f"{sys.executable} -c 'raise SystemExit(3)'", "failed to build the source"),
         ("PYCRAFT_CACHE", "/dev/null/folder", "set PYCRAFT_CACHE"),
     ],
 )

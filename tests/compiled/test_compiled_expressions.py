@@ -118,7 +118,7 @@ def test_compiled_expressions_run():
 
 
 def test_named_vectors_are_arguments():
-    """By names that mean something else in what is written, too."""
+    """Also with names that have another meaning in the written code."""
     model = TREES["screws, balls, sliders"]()
     q = model.random_state(4).q
     s, y = (pc.vector(name, model.soa.Theta) for name in ("s", "y"))

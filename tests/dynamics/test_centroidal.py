@@ -118,7 +118,7 @@ def test_what_floats_keeps_its_momentum_and_falls():
 
 def test_neither_place_nor_travel_takes_digits():
     """Moved by 2²⁷ m along x and by 2¹³ m/s, both exact beside the state's own doubles: what is about the centre of mass keeps its bits
-    but for rounding of the state."""
+    up to rounding of the state."""
     mb = pc.tree([-1, 0, 0, 1], ["free", "pin", "ball", "pin"], seed=3)
     state = mb.random_state(1)
     q, v = np.array(state.q), np.array(state.v)

@@ -1,4 +1,4 @@
-"""What couplings are for, gears, mimics, racks, differentials and cables, each against its closed form, by both methods.
+"""Uses of couplings: gears, mimics, racks, differentials and cables, each against its closed form, by both methods.
 
 Drums on the base turn about z and carriages slide along x, each with an inertia of its own: in closed form what is felt at one of
 them is written out. Tolerance: rounding of numbers of order ten over inertias of order one, 1e-13.

@@ -1,4 +1,4 @@
-"""What divide and conquer has to itself; that it agrees on every kind of hinge and tree is in test_methods.py, as of every method.
+"""Properties of divide and conquer alone; test_methods.py compares it, like every method, on every kind of hinge and tree.
 
 Tolerances. Every step eliminates rows from a positive definite inertia, as the articulated-body algorithm does, and errs as that does: eps
 times what was added up in a pivot over the pivot, times the number of steps. So it is held to ten times what the fast form errs by, or to
@@ -198,7 +198,7 @@ def test_heavy_rotors(inertia):
 @pytest.mark.parametrize("kind", ["pin", "slider", "ball"])
 @pytest.mark.parametrize("links_there", [1, 2, 50, 400])
 def test_what_rests_is_not_refused_for_having_no_digits(kind, links_there):
-    """Accelerations that are zero but for rounding, of N² g/l at most: the largest force over the inertia of one link."""
+    """Accelerations that are zero up to rounding, of N² g/l at most: the largest force over the inertia of one link."""
     model = pc.tree(list(range(-1, links_there - 1)), kind, seed=3)
     model.gravity = (0, 0, -9.81)
     q, zero = model.random_state(3).q, np.zeros(model.nv)
@@ -290,8 +290,8 @@ print(resident() - before, calls.memory("divide-and-conquer", "double"), *found.
 
 
 def test_memory_is_what_is_held():
-    """No square of the number of bodies anywhere; what is counted is what a process takes up, but for names and the allocator's. A process
-    of its own: in one that has freed much before, what is taken is not new."""
+    """No square of the number of bodies anywhere; the memory of a process is counted, except names and the allocator's. A separate
+    process is used: one that has freed much memory before takes no new memory."""
     told = subprocess.run([sys.executable, "-c", MEMORY], capture_output=True, text=True, check=True).stdout
     taken, counted, links_there = map(int, told.split())
     assert links_there == 100_000

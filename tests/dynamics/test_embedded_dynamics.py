@@ -58,7 +58,7 @@ def test_as_by_multipliers(name):
 
 
 def test_the_order_of_states_is_not_felt():
-    """What a state's numbers are does not hang on what was asked before it."""
+    """The values at a state do not depend on earlier requests."""
     model = two_loops()
     q, v, tau, _ = states_of(model, 4)
     forward = model.constrained_dynamics(q, v, tau, method="embed").vdot

@@ -103,7 +103,7 @@ def test_joints_keep_their_digits_at_orbital_speed(root, form):
 
 @pytest.mark.parametrize("way", [*({"form": f, "refine": r} for f in FORMS for r in (0, 1)), *({"method": m} for m in METHODS)], ids=str)
 def test_forward_dynamics_does_not_see_a_common_velocity_or_place(way):
-    """Bit for bit, alone and in batches, in every form and by every method; but for the root's own linear coordinates, which see ω × v."""
+    """Bit for bit, alone and in batches, in every form and by every method; except the root's own linear coordinates, which see ω × v."""
     for seed in range(3):
         model, q, v, tau = bus(seed)
         rows = [i for i in range(model.nv) if i not in (3, 4, 5)]
@@ -155,8 +155,8 @@ def test_minimum_norm_answers_do_not_move_along_the_null_space():
     assert np.abs(vdot).max() <= 1e-10
 
 
-# ---- every direct call, at 1e4 m/s and 1e8 m away. Parts of each result are judged by their own largest entry: rows of joints apart from
-# those of the root, whose forces and accelerations are as large as the speed makes them.
+# ---- every direct call, at 1e4 m/s and 1e8 m away. Parts of each result are judged by their own largest entry: rows of joints separately
+# from rows of the root, whose forces and accelerations are as large as the speed makes them.
 
 
 def parts(model, result):

@@ -1,4 +1,4 @@
-"""One rule for what is told to move, or to stay: `hybrid_dynamics(prescribed=)`, `soa.free` and `equilibrium(hold=)`."""
+"""One rule for coordinates that are moved, or held: `hybrid_dynamics(prescribed=)`, `soa.free` and `equilibrium(hold=)`."""
 
 import numpy as np
 import pytest

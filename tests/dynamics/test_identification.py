@@ -1,4 +1,4 @@
-"""Inertial parameters from logs: what is told, with errors as they should be, and bodies where least squares give none."""
+"""Inertial parameters from logs: determined parameters, with correct errors, and bodies where least squares give none."""
 
 import sys
 
@@ -274,7 +274,7 @@ def test_some_bodies_alone():
     prior = model.inertial_parameters()
     found = model.identify(*data, bodies=model.bodies["panda_link7"])
     assert np.array_equal(found.parameters[:60], prior[:60])
-    agree(found.parameters[60:], truth[60:], 1e-10)  # all ten of a hand are told
+    agree(found.parameters[60:], truth[60:], 1e-10)  # all ten of a hand are determined
     assert len(found.base) == 10 and found.base[0].name == "panda_link7.mass"
 
 
@@ -360,7 +360,7 @@ def test_refusals():
     for options, message in [
         (dict(bodies="hand"), "hand"),
         (dict(viscous="elbow"), "elbow"),
-        (dict(noise=-1.0), "noise: a positive standard deviation"),
+        (dict(noise=-1.0), "noise must be a positive standard deviation"),
         (dict(noise=[1, 2, 3]), "one for each of 2 coordinates"),
     ]:
         with pytest.raises(pc.ModelError, match=message):

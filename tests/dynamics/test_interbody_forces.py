@@ -59,7 +59,7 @@ def test_of_the_reference(model):
 
 
 def balance(model, q, v, vdot, f, wrenches):
-    """Of every body alone, in the world's axes about its own centre of mass: what acts on it less the rate of its momentum."""
+    """Return the forces on every body less the rate of its momentum, in the world's axes about its own centre of mass."""
     left = np.zeros_like(f)
     for k, (name, body) in enumerate(model.bodies.items()):
         frame = model.frame(name)

@@ -48,7 +48,7 @@ def test_wider_precisions_agree(model):
 
 
 def test_jacobians_and_poses(model):
-    """Of every body, and of nodes off a body and off the base: a batch is its states, and as exact as sums of 6 products on the way are."""
+    """Every body, and nodes off a body and off the base: a batch equals its states, and is as exact as sums of 6 products on the path."""
     turned = np.array([[0, -1, 0], [0.6, 0, -0.8], [0.8, 0, 0.6]])
     nodes = {"off a body": [None, *model.bodies][-1], "off the base": None}
     for name, body in nodes.items():
@@ -190,7 +190,7 @@ def test_no_state_and_no_coordinate():
 
 
 def test_kernels_follow_the_model():
-    """What a call of before knew of the model is not used after an edit."""
+    """Data of the model cached by an earlier call are not used after an edit."""
     model = arm(0.3)
     q, v = (0.3, 0.4), (0.5, 0.6)
     before = model.bias_forces(q, v)

@@ -48,7 +48,7 @@ def test_remainders_of_packs(name, call):
 
 
 def test_gravity_is_that_of_the_call():
-    """∂T/∂q at rest is that of the weights: none without gravity, and linear in it."""
+    """∂T/∂q at rest is the derivative of the weights: zero without gravity, and linear in it."""
     model, still = pc.robots.panda(), np.zeros(7)
     q = model.random_state(3).q
     slopes = []
@@ -74,7 +74,7 @@ def test_singular_models_are_refused_as_ever():
 
 
 def test_states_in_doubt_are_those_of_the_general_recursions():
-    """The third pin turns a point mass that lies on its axis but for 10⁻⁶: kernels do not trust that pivot."""
+    """The third pin turns a point mass that lies on its axis up to 10⁻⁶: kernels do not trust that pivot."""
     model = pc.Multibody("near")
     model.add_body("base", mass=1.0, com=(0.3, 0, 0), inertia=np.eye(3))
     model.add_body("arm", "base", axis=(0, 1, 0), position=(0.5, 0, 0), mass=0.0)

@@ -1,5 +1,5 @@
 """Forward dynamics by kernels in the forms that carry factors (cpp/kernels/factored_dynamics.h) and in precisions wider than double: a
-batch is its states, digits and refusals are those of the general recursions.
+batch is its states, digits and refusals equal the general recursions'.
 
 Errors are relative 2-norms of a state's accelerations. What is left of them where nothing cancels is some roundings of the sweeps: eps √n
 and a few.
@@ -76,7 +76,7 @@ def test_heavy_tips_cost_no_digits(form):
 
 
 def test_kernels_are_what_runs():
-    """What they are compared with rounds apart: no bits of the general recursions. Wider numbers show that where a heavy tip has cost
+    """The reference rounds independently of the general recursions' bits. Wider numbers show this where a heavy tip has cost
     digits."""
     ways = [*WAYS.values(), *({**how, "precision": "single"} for how in WAYS.values() if "refine" not in how), *WIDE.values()]
     for how in ways:
@@ -87,7 +87,7 @@ def test_kernels_are_what_runs():
 
 @pytest.mark.parametrize(("precision", "ratio"), [("extended", 1e7), ("quad", 1e22)])
 def test_wide_numbers_have_all_their_digits(model, precision, ratio):
-    """What heavy tips lose shows how many digits a value was computed with: the general recursions lose as much."""
+    """The loss from heavy tips shows the number of digits of a computation: the general recursions lose as much."""
     for times in (1.0, ratio):
         tipped = heavy(model, times)
         given = states(tipped)
@@ -158,7 +158,7 @@ def test_doubted_states_in_a_batch(way):
 
 @pytest.mark.parametrize(("precision", "most"), [("extended", 1e-17), ("quad", 1e-30)])
 def test_reports_of_wide_numbers_start_from_all_their_digits(precision, most):
-    """What kernels return is rounded to a double: a refinement of more digits does not begin there."""
+    """Results of kernels are rounded to doubles: a refinement with more digits does not start from them."""
     model = MODELS["chain of 30"]
     q, v, u = (x[0] for x in states(model))
     report = model.refinement(q, v, u, refine=1, residual="wider", precision=precision)

@@ -1,8 +1,8 @@
 """Direct calls where numbers, models and callers are unkind: units and angles of any size, far points, what is not finite, singular states
 amid a batch, shared memory, edits, threads, wide and deep trees. The oracle is a wider precision, or bits that must not change.
 
-Left out: four coordinates that carry one point mass (a slider, three pins, massless links) are not always refused, by general recursions
-neither.
+Not covered: four coordinates that carry one point mass (a slider, three pins, massless links) are not always refused, nor do the general
+recursions refuse them.
 """
 
 import copy

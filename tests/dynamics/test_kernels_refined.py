@@ -66,7 +66,7 @@ CORRECTED = {
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", CORRECTED)
 def test_what_heavy_tips_lose_is_corrected(name, way):
-    """What the plain form has lost comes back, in most states to rounding; in others corrections may be that."""
+    """Refinement restores the digits that the plain form has lost, in most states to rounding; in others corrections may be rounding."""
     model = CORRECTED[name]()
     given = states(model)
     lost, left = errors(model, given), errors(model, given, **WAYS[way])

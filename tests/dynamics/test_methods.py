@@ -31,7 +31,7 @@ def solve(model, method, q, v, tau, precision="double", out=None):
 
 
 def bound(model, method, q, v, tau, x):
-    """What rounding may make of the accelerations x, in the norm."""
+    """Return the possible effect of rounding on the accelerations x, in the norm."""
     o = reference.operators(model.description(), q, v)
     mass_matrix = o.mass_matrix + o.J
     inverse = norm(np.linalg.inv(mass_matrix))

@@ -56,7 +56,7 @@ REGULAR = [
 
 @pytest.mark.parametrize("name, model, count", REGULAR, ids=[name for name, *_ in REGULAR])
 def test_inertia(name, model, count):
-    """Λ is the inverse, and that of the operators."""
+    """Λ is the inverse, and equals the operators'."""
     names = moving(model)
     of = [names[-1], names[len(names) // 2], names[0 if name == "every kind" else len(names) // 4]][:count]
     Q = states(model, 5)[0]

@@ -31,7 +31,7 @@ def test_what_is_no_name_is_refused_by_the_option(call, given):
 
 @pytest.mark.parametrize("call", CALLS)
 def test_none_is_no_default(call):
-    """What is left out has its default; None is refused, also where options are read once."""
+    """Omitted options have their defaults; None is refused, also where options are read once."""
     if call not in ("interbody_forces", "interbody_forces_derivatives"):
         with pytest.raises(pc.EvaluationError, match=r"form=None|no form .* is called 'None'"):
             CALLS[call](pc.chain(2), form=None)
@@ -149,7 +149,7 @@ def test_numbers_of_an_integration_and_poses_of_copies():
             pc.Multibody.from_description(given)
     with pytest.raises(pc.ModelError, match="a set of operators is named by a string"):
         arm.soa(None)
-    with pytest.raises(pc.ModelError, match="batch: a number of states, from 0 to"):
+    with pytest.raises(pc.ModelError, match="batch must be a number of states from 0 to"):
         arm.neutral(10**30)
 
 

@@ -173,7 +173,7 @@ def test_batches_are_counted_by_any_whole_number():
 
 @pytest.mark.parametrize("call", CALLS)
 def test_the_core_takes_what_the_method_takes(call):
-    """But for out= and threads=, and for what leads to other computations."""
+    """Except out= and threads=, and options that lead to other computations."""
     arrays, options = _core.direct_calls()[call]
     method = inspect.signature(getattr(pc.Multibody, call)).parameters
     assert [name for name in method if name in arrays] == list(arrays)

@@ -224,7 +224,7 @@ def test_degenerate_models():
     massless.take_warnings()
     with pytest.raises(pc.SingularHingeError, match="hinge1"):
         massless.quadratic_model()
-    inner = pc.chain(2)  # the inner one is: what hangs on it has mass
+    inner = pc.chain(2)  # the inner one is: its outboard body has mass
     inner.bodies["body0"].mass, inner.bodies["body0"].inertia = 0.0, np.zeros((3, 3))
     inner.take_warnings()
     q, v, tau = np.array([0.3, 0.9]), np.array([0.4, -0.2]), np.array([0.1, 0.5])

@@ -182,7 +182,7 @@ def test_identification_finds_unequal_rotors():
 
 @each_model
 def test_beside_expressions(name):
-    """𝒞 is Hφ(Mφ*a + b) and the rotors' forces, those of the reference."""
+    """𝒞 is Hφ(Mφ*a + b) plus the rotors' forces of the reference."""
     model, q, v, _ = drawn(name, 7)
     soa, o = model.soa, reference.operators(model.description(), q, v)
     agree(model.rotor_forces(v), o.b_J)

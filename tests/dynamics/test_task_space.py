@@ -232,7 +232,7 @@ def test_derivatives(name):
 
 
 def test_derivatives_with_rotors_and_of_the_operator():
-    """Of whole frames they are those of the operator Λ; rotor inertias are in Λ and not in what changes."""
+    """For whole frames they equal the derivatives of the operator Λ; rotor inertias are in Λ but not in its derivative."""
     model = MODELS["panda"]
     for hinge in model.hinges.values():
         hinge.rotor_inertia = 0.2
@@ -253,11 +253,11 @@ def test_derivatives_with_rotors_and_of_the_operator():
         ("hand", "is called 'hand'"),
         ([], "a task space needs frames"),
         (["body1", "body1"], "frame 'body1' is named twice"),
-        ({"body1": ["x", "w"]}, "directions of 'body1': different ones of rx, ry, rz, x, y, z, or rows (k, 6); not ['x', 'w']"),
-        ({"body1": ["x", "x"]}, "directions of 'body1': different ones"),
-        ({"body1": 3}, "directions of 'body1': rows (k, 6), not ()"),
-        ({"body1": []}, "directions of 'body1': different ones"),
-        ({"body1": [[1, 0, 0]]}, "directions of 'body1': rows (k, 6), not (1, 3)"),
+        ({"body1": ["x", "w"]}, "directions of 'body1' must be different ones of rx, ry, rz, x, y, z, or rows (k, 6); not ['x', 'w']"),
+        ({"body1": ["x", "x"]}, "directions of 'body1' must be different ones"),
+        ({"body1": 3}, "directions of 'body1' must be rows (k, 6), not ()"),
+        ({"body1": []}, "directions of 'body1' must be different ones"),
+        ({"body1": [[1, 0, 0]]}, "directions of 'body1' must be rows (k, 6), not (1, 3)"),
         ({"body1": np.ones((2, 6))}, "the 2 rows are linearly dependent"),
         ({"body1": [[1, 0, 0, 0, 0, 0], [0, np.nan, 0, 0, 0, 0]]}, "directions of 'body1': row 1 is not finite"),
         ([3], "a frame"),

@@ -52,5 +52,5 @@ def test_no_scheduler(monkeypatch):
     from pycraft.ensembles import backends
 
     monkeypatch.setattr(backends, "PATIENCE", 1)
-    with pytest.raises(pc.EvaluationError, match="no Dask scheduler answers there"):
+    with pytest.raises(pc.EvaluationError, match="no Dask scheduler answers at this address"):
         pc.sweep(sweeps.square, {"x": [1.0]}, on="tcp://127.0.0.1:9", progress=False)

@@ -134,7 +134,7 @@ def test_another_sweep_in_the_folder_is_refused(tmp_path):
 
 def test_two_sweeps_at_work_in_one_folder_are_refused(tmp_path):
     def inner(x):
-        with pytest.raises(pc.EvaluationError, match="another sweep is at work in this folder"):
+        with pytest.raises(pc.EvaluationError, match="another sweep is writing to this folder"):
             pc.sweep(inner, {"x": [1]}, output=tmp_path / "out", progress=False)
         return x
 
@@ -154,7 +154,7 @@ def test_folders_that_cannot_be_written(tmp_path):
     pc.sweep(sweeps.square, {"x": [1]}, output=tmp_path / "out", progress=False).close()
     about = json.loads((tmp_path / "out" / "sweep.json").read_text())
     (tmp_path / "out" / "sweep.json").write_text(json.dumps(about | {"format": "pycraft sweep 0"}))
-    with pytest.raises(pc.EvaluationError, match="another version, 'pycraft sweep 0'"):
+    with pytest.raises(pc.EvaluationError, match="the format 'pycraft sweep 0'"):
         pc.load_sweep(tmp_path / "out")
 
 
@@ -178,7 +178,7 @@ def test_samples_that_are_objects_are_known_again(tmp_path):
 
 def test_names_that_are_taken(tmp_path):
     for taken in ("x", "error", "seconds"):
-        with pytest.raises(pc.EvaluationError, match=f"calls a value '{taken}', which is taken"):
+        with pytest.raises(pc.EvaluationError, match=f"names a value '{taken}', a reserved name"):
             pc.sweep(lambda x, taken=taken: {taken: 1.0}, {"x": [1]}, progress=False)
 
 

@@ -13,7 +13,7 @@ from pycraft.progress_bar import RunProgress, StepProgress
 
 @pytest.fixture
 def screen(monkeypatch):
-    """What a terminal of 100 columns is sent."""
+    """Return the text sent to a terminal of 100 columns."""
     written, Console = io.StringIO(), rich.console.Console
     monkeypatch.setattr(rich.console, "Console", lambda **_: Console(file=written, force_terminal=True, width=100))
     monkeypatch.setattr(progress_bar, "SECONDS", -1.0)
@@ -29,7 +29,7 @@ def test_a_run(screen):
 
 
 def test_a_sweep(screen):
-    """What was finished before counts as done, and not for the rate."""
+    """Runs finished before count as done, but not for the rate."""
     with SweepProgress(10, 4) as bar:
         bar.add(2, 0)
         bar.add(2, 1)

@@ -53,22 +53,25 @@ def test_states_are_those_of_the_model():
 def test_two_together():
     both = pc.samples.grid({"a": [1, 2]}) | {"b": [3, 4]}
     assert both.row(1) == {"a": 2.0, "b": 4.0} and repr(both) == "<2 samples of a, b>"
-    with pytest.raises(pc.ModelError, match="a is in both"):
+    with pytest.raises(pc.ModelError, match="a occurs in both sets of samples"):
         both | {"a": [1, 2]}
 
 
 @pytest.mark.parametrize(
     "call, text",
     [
-        (lambda: Samples({}), "a mapping of names to values"),
-        (lambda: Samples({"a": [1], "b": [1, 2]}), "as many values of each name, not 1 of a, 2 of b"),
-        (lambda: Samples({"a": []}), "samples of 'a': there is one value at least"),
+        (lambda: Samples({}), "samples must map names to values"),
+        (lambda: Samples({"a": [1], "b": [1, 2]}), "every name needs the same number of values; got 1 of a, 2 of b"),
+        (lambda: Samples({"a": []}), "samples of 'a': at least one value is needed"),
         (lambda: Samples({"a": 3}), "samples of 'a' must be a list, not 3"),
-        (lambda: pc.samples.random(0, {"a": (0, 1)}), "count=0: there is one sample at least"),
-        (lambda: pc.samples.random(3, {"a": (1, 0)}), r"range of 'a': \(low, high\), two finite numbers in this order, not \(1, 0\)"),
+        (lambda: pc.samples.random(0, {"a": (0, 1)}), "count=0: at least one sample is needed"),
+        (
+            lambda: pc.samples.random(3, {"a": (1, 0)}),
+            r"range of 'a': give \(low, high\), two finite numbers with low <= high, not \(1, 0\)",
+        ),
         (lambda: pc.samples.random(3, {"a": "x"}), "range of 'a': .*a frozen distribution of scipy.stats, not 'x'"),
         (lambda: pc.samples.random(3, {"a": (0, np.inf)}), "two finite numbers"),
-        (lambda: pc.samples.sobol(4, {"a": (0, 1)}, seed=-1), "seed: a whole number from 0 on"),
+        (lambda: pc.samples.sobol(4, {"a": (0, 1)}, seed=-1), "seed must be a whole number from 0 on"),
     ],
 )
 def test_what_makes_no_sense_is_refused(call, text):

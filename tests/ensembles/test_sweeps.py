@@ -64,7 +64,7 @@ def test_a_function(scene):
 
 
 def test_statements_over_many_models():
-    """What holds of every model and what does not, on processes."""
+    """Statements that hold on every model and statements that do not, on processes."""
     models = [pc.chain(2), pc.robots.panda(), pc.tree([-1, 0, 0, 1], seed=3)]
     for statement, holds in (("inv(psi) == inv(phi) + K*H", True), ("psi == phi", False)):
         found = pc.sweep(sweeps.check_statement, {"model": models, "statement": [statement] * 3}, on="processes", workers=1, progress=False)
@@ -85,7 +85,7 @@ def test_values_of_another_shape_are_a_failure():
     found = pc.sweep(lambda x: {"y": [0.0] * int(x)}, {"x": [2, 2, 3]}, progress=False, workers=1)
     assert found["y"].shape == (3, 2)
     assert [(f.sample, f.reason) for f in found.failures] == [
-        (2, "values unlike those of the first run: y of shape (3,) and not of shape (2,)")
+        (2, "values of another kind than in the first run: y is of shape (3,), not of shape (2,)")
     ]
 
 
@@ -103,11 +103,11 @@ def test_ctrl_c_keeps_what_is_finished():
 
 @pytest.mark.parametrize("kill, failed", [(sweeps.die_once, []), (sweeps.die_always, [3])])
 def test_a_process_that_dies(tmp_path, kill, failed):
-    """What it had is run again; the sample that kills its process each time is a failure, and the only one."""
+    """Its runs are repeated; the sample that kills its process each time is a failure, and the only one."""
     samples = {"x": list(range(12))} | ({"folder": [str(tmp_path)] * 12} if kill is sweeps.die_once else {})
     found = pc.sweep(kill, samples, on="processes", workers=2, progress=False)
     assert found.finished.all() and [failure.sample for failure in found.failures] == failed
-    assert all(failure.reason == "its process died" for failure in found.failures)
+    assert all(failure.reason == "the worker process died" for failure in found.failures)
     assert [value for i, value in enumerate(found["value"]) if i not in failed] == [i * i for i in range(12) if i not in failed]
 
 
@@ -130,10 +130,10 @@ def test_threads_have_scenes_of_their_own(scene):
     [
         ({"q.elbw": [1]}, "'q.elbw': .* has no hinge or coordinate 'elbw'"),
         ({"bodies.BODY.mas": [1]}, "has no 'mas'; did you mean 'mass'"),
-        ({"bodies.none.mass": [1]}, "there is no 'none' among the bodies"),
-        ({"effects.dampin.coefficient": [1]}, "no 'dampin' among the effects; did you mean 'damping'"),
+        ({"bodies.none.mass": [1]}, "the scene's bodies include no 'none'"),
+        ({"effects.dampin.coefficient": [1]}, "the scene's effects include no 'dampin'; did you mean 'damping'"),
         ({"effects.gravity.g[3]": [1]}, r"g of 'gravity' has the shape \(3,\)"),
-        ({"mass": [1]}, "'mass' is nothing that a scene has; write q.HINGE"),
+        ({"mass": [1]}, "a scene has no 'mass'; write q.HINGE"),
         ({"q": [[0, 0]], "q.FIRST": [1]}, "q and q.* both set a coordinate; leave one out"),
     ],
 )
@@ -147,11 +147,11 @@ def test_names_that_nothing_has_are_refused_before_the_first_run(scene, samples,
 @pytest.mark.parametrize(
     "options, error, text",
     [
-        ({}, pc.EvaluationError, "takes T, how long each run is"),
-        ({"T": 1.0, "integrater": "rkmk4"}, pc.EvaluationError, "no 'integrater'; there are integrator"),
+        ({}, pc.EvaluationError, "needs T, the duration of each run"),
+        ({"T": 1.0, "integrater": "rkmk4"}, pc.EvaluationError, "no option 'integrater'; its options are integrator"),
         ({"T": 1.0, "integrator": "rkmk5"}, pc.EvaluationError, "rkmk4"),
         ({"T": -1.0}, pc.EvaluationError, "positive number of seconds"),
-        ({"T": 1.0, "on": "thread"}, pc.EvaluationError, "on='thread': there are \"threads\""),
+        ({"T": 1.0, "on": "thread"}, pc.EvaluationError, "on='thread': choose \"threads\""),
         ({"T": 1.0, "workers": 0}, pc.EvaluationError, "workers=0"),
     ],
 )
@@ -161,7 +161,7 @@ def test_options_that_make_no_sense_are_refused(scene, options, error, text):
 
 
 def test_neither_scene_nor_function():
-    with pytest.raises(pc.ModelError, match="of a scene or of a function, not of 3"):
+    with pytest.raises(pc.ModelError, match="a scene or a function, not 3"):
         pc.sweep(3, {"x": [1]})
-    with pytest.raises(pc.EvaluationError, match="a function has its samples alone"):
+    with pytest.raises(pc.EvaluationError, match="a function takes only its samples"):
         pc.sweep(sweeps.square, {"x": [1]}, 1.0)

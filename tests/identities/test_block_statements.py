@@ -121,7 +121,7 @@ ERRORS = [
     ("Ω(k) = Υ(k)", "has blocks between two bodies", None),
     ("V(i,j) = V(i)", "blocks have one body", None),
     ("D(k)² = D(k)", "of blocks there are", None),
-    ("φ(i,j) = 0, i above j and j above i", "no bodies are as it says", None),
+    ("φ(i,j) = 0, i above j and j above i", "satisfy its relations", None),
 ]
 
 
@@ -154,7 +154,7 @@ def test_what_does_not_take_them_says_so():
     for call in (pc.truth, pc.repair):
         with pytest.raises(pc.EvaluationError, match="statements by block are not mapped or repaired"):
             call("Ω(i,j) = Υ(i)ψ(i,j), i above j")
-    with pytest.raises(pc.EvaluationError, match="none of operators"):
+    with pytest.raises(pc.EvaluationError, match="without a form in operators"):
         prove("Ω(i,j) = Υ(i)ψ(i,j), i above j")
 
 

@@ -1,4 +1,4 @@
-"""What fails makes a report false, whatever else is in it, and ends the command with 1."""
+"""A failing statement makes a report false, whatever else is in it, and ends the command with 1."""
 
 import pytest
 from typer.testing import CliRunner

@@ -86,8 +86,8 @@ def test_what_binds_to_what(typed, meant, read):
 MISREAD = [
     # typed, what is said, the column of the caret
     ("D \\ D", "a left division is not read: A \\\\ B is inv\\(A\\) B", 2),
-    ("HψMψ*H* = Q", "no operator is called 'Q'", 10),
-    ("H ph M", "no operator is called 'ph'; the nearest names are phi", 2),
+    ("HψMψ*H* = Q", "Q is a letter of models with loops", 10),
+    ("H ph M", "no operator is called 'ph'; the nearest names are φ", 2),
     (r"\phi \foo D", r"the command \\foo is not known here", 5),
     ("φ = det(D)", "a determinant is read by its logarithm, ln det A", 4),
     ("HφMφ*H* = ℳ)", r"not understood at '\)'", 11),

@@ -1,4 +1,4 @@
-"""Numbers of a statement that are near each other are told apart, or the check is undecided: never true for want of digits."""
+"""Numbers of a statement that are near each other are distinguished, or the check is undecided: never true for lack of digits."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What inverse kinematics refuses: by name, and leaving the model as it was."""
+"""Refusals of inverse kinematics: by name, with the model unchanged."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ CASES = {
     "an unknown frame": (dict(targets={"bdoy1": X}), "the nearest is 'body1'"),
     "the base": (dict(targets={None: X}), "a target of the base, which moves nowhere"),
     "nothing": (dict(targets={}), "no target: give {frame: pose}, or centre_of_mass="),
-    "no dictionary": (dict(targets="tip"), "targets: a dictionary {frame: target}"),
+    "no dictionary": (dict(targets="tip"), "targets must be a dictionary {frame: target}"),
     "not a number": (dict(targets={"tip": (0, np.nan, 0)}), r"position of the target of 'tip': entry \[0, 1\] is nan|entry \[1\] is nan"),
     "infinite": (dict(targets={"tip": (0, np.inf, 0)}), "position of the target of 'tip': entry"),
     "a mirror": (dict(targets={"tip": MIRROR}), "the target of 'tip': its matrix is no rotation, it mirrors"),
@@ -37,7 +37,7 @@ CASES = {
     "the axes of nothing": (dict(targets={"tip": dict(position=(0, 0, 0), axes="target")}), "no axes of its own without an orientation"),
     "unknown axes": (dict(targets={"tip": dict(pose=X, axes="boby0")}), "the nearest is 'body0'"),
     "an unknown wrt": (dict(targets={"tip": dict(pose=X, wrt="elbow")}), "'elbow'"),
-    "a weight": (dict(targets={"tip": dict(pose=X, weight=0)}), "weight of the target of 'tip': a positive number"),
+    "a weight": (dict(targets={"tip": dict(pose=X, weight=0)}), "weight of the target of 'tip' must be a positive number"),
     "a number whose square is none": (dict(targets={"tip": (1e160, 0, 0)}), "position of the target of 'tip': 1e\\+160 is beyond 1e\\+100"),
     "an axis whose square is none": (
         dict(targets={"tip": dict(axis=(1e300, 0, 0), along=(0, 1, 0))}),
@@ -45,8 +45,8 @@ CASES = {
     ),
     "a weight whose square is none": (dict(targets={"tip": dict(position=X[:3, 3], weight=1e200)}), "weight of the target of 'tip': from"),
     "a weight that is nothing": (dict(targets={"tip": dict(position=X[:3, 3], weight=1e-200)}), "weight of the target of 'tip': from"),
-    "three weights": (dict(targets={"tip": dict(pose=X, weight=(1, 2, 3))}), "weight of the target of 'tip': a positive number"),
-    "a tolerance": (dict(targets={"tip": X}, tolerance=-1), "tolerance: a positive number for rad and m"),
+    "three weights": (dict(targets={"tip": dict(pose=X, weight=(1, 2, 3))}), "weight of the target of 'tip' must be a positive number"),
+    "a tolerance": (dict(targets={"tip": X}, tolerance=-1), "tolerance must be a positive number for rad and m"),
     "a target's tolerance": (dict(targets={"tip": dict(pose=X, tolerance=(1, np.nan))}), "tolerance of the target of 'tip'"),
     "q0 of another size": (dict(targets={"tip": X}, q0=[0.0]), "q of 'chain of 2 rods' takes 2"),
     "q0 that is no number": (dict(targets={"tip": X}, q0=[0.0, np.nan]), "q of hinge 'hinge1'"),

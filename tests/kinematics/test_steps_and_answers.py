@@ -44,7 +44,7 @@ def test_what_is_lost_and_missed_is_told_in_directions_and_not_in_weights():
 
 
 def test_members_answer_for_their_own_targets():
-    """What is lost of an orientation depends on it."""
+    """The lost directions of an orientation depend on it."""
     from scipy.spatial.transform import Rotation
 
     arm = one_link()

@@ -83,7 +83,7 @@ def test_loops_hold_on_the_way_to_a_posture():
 
 
 def test_which_rows_of_loops_are_angles():
-    """By the tolerance they are told with, (rad, m). Rows of velocities are no targets."""
+    """Their tolerance is (rad, m). Rows of velocities are no targets."""
     model = pc.tree([-1, 0, 1, 2], ["pin", "pin", "slider", "pin"])
     hinges = list(model.hinges)
     model.add_loop("body1", None, "universal", axes=[(1, 0, 0), (0, 1, 0)], name="about it")

@@ -1,4 +1,4 @@
-"""What users give to models: setters check as constructors do. A part of `campaigns.arguments` runs here."""
+"""User input of models: setters check as constructors do. A part of `campaigns.arguments` runs here."""
 
 import numpy as np
 import pytest
@@ -247,7 +247,7 @@ def test_two_coordinates_never_have_one_name():
 
 
 class Outside:
-    """A linear operator as SciPy has them, whose product is what it is told to be."""
+    """A linear operator as SciPy has them, with a given product."""
 
     def __init__(self, result):
         self.result, self.shape, self.dtype = result, (3, 3), np.dtype(float)
@@ -298,10 +298,10 @@ def test_descriptions_are_checked():
     [
         (lambda: pc.tree([-1, 1], "pin"), "body 1 of a tree has parent 1; parents come before their children"),
         (lambda: pc.tree([-1, -2], "pin"), "body 1 of a tree has parent -2"),
-        (lambda: pc.chain(2, seed=-1), "seed: a whole number from 0 on, or a numpy.random.Generator, not -1"),
-        (lambda: pc.chain(2, seed=True), "seed: a whole number, not True"),
-        (lambda: pc.chain(True), "the number of bodies of a chain: a whole number, not True"),
-        (lambda: pc.chain(2.0), "the number of bodies of a chain: a whole number, not 2.0"),
+        (lambda: pc.chain(2, seed=-1), "seed must be a whole number from 0 on, or a numpy.random.Generator, not -1"),
+        (lambda: pc.chain(2, seed=True), "seed must be a whole number, not True"),
+        (lambda: pc.chain(True), "the number of bodies of a chain must be a whole number, not True"),
+        (lambda: pc.chain(2.0), "the number of bodies of a chain must be a whole number, not 2.0"),
         (lambda: pc.chain(2, mass=[1.0]), "mass of a rod takes one number, not an array"),
     ],
 )

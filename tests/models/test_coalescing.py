@@ -86,7 +86,7 @@ def test_in_any_order_one_by_one(seed):
 
 
 def test_of_a_chain_of_welds_any_one():
-    """a into b and b into c: a split alone hangs on c, and on b again once that is split."""
+    """a into b and b into c: when a is split alone, c carries it, and b again once that is split."""
     model = pc.chain(5, seed=2)
     model.q = [0.1, 0.4, -0.3, 0.8, 0.2]
     before = bits(model)

@@ -16,7 +16,7 @@ EPS = float(np.finfo(float).eps)
 @pytest.mark.parametrize("floating", [False, True])
 @pytest.mark.parametrize("form", ["fast", "ud", "square-root"])
 def test_accelerations_and_multipliers_are_those_of_the_dense_equations(floating, form):
-    # Open loops, too: the equations ask for r̈ = 0 wherever r is. Tolerance: κ of Q ℳ⁻¹ Q* is below 1e4 here.
+    # Also open loops: the equations require r̈ = 0 wherever r is. Tolerance: κ of Q ℳ⁻¹ Q* is below 1e4 here.
     mb, q, v, tau = spatial(floating)
     got = mb.constrained_dynamics(q, v, tau, form=form)
     vdot, lam = dense(mb, q, v, tau)

@@ -54,7 +54,7 @@ def pose(q):
 
 
 def held_by(name, seed=1):
-    """A body, free but for a loop by this hinge, and one on that hinge in the tree, each with the same mass."""
+    """Return a body that is free except for a loop by this hinge, and one on that hinge in the tree, each with the same mass."""
     rng = np.random.default_rng(seed)
     at, com, inertia = placement(rng), rng.normal(size=3), np.diag([2.0, 3.0, 4.0])
     by_loop, in_tree = pc.Multibody("by a loop"), pc.Multibody("in the tree")
@@ -92,7 +92,7 @@ def test_a_hinge_of_the_tree_keeps_its_own_rows(name):
 
 @pytest.mark.parametrize("name", HINGES)
 def test_a_body_moves_as_on_the_hinge(name):
-    """Rank, accelerations, and energy of a scene, both ways: those of the body on the hinge in the tree."""
+    """Rank, accelerations, and energy of a scene, by both methods: equal to the body on the hinge in the tree."""
     by_loop, in_tree = held_by(name)
     assert np.abs(by_loop.loops.residual()).max() < 1e-14
     assert by_loop.mobility().degrees_of_freedom == FREEDOMS[name] and not by_loop.mobility().singular
@@ -130,7 +130,7 @@ def test_rows_span_those_of_a_kind(kind, subhinges):
 
 @pytest.mark.parametrize("name", HINGES)
 def test_rows_off_the_loop(name):
-    """Q*r is the gradient of |r|²/2, Q hangs on 6 - n rows exactly, Q̇θ̇ is its rate; in quad, too."""
+    """Q*r is the gradient of |r|²/2, Q depends on 6 - n rows exactly, Q̇θ̇ is its rate; also in quad."""
     model, _ = held_by(name)
     rng = np.random.default_rng(4)
     rows = model.loops["held"]

@@ -22,7 +22,7 @@ def inertial(inside):
 
 
 def text_of(path, text, **options):
-    """What loading the text says."""
+    """Return the error of loading the text."""
     path.write_text(text)
     with pytest.raises(pc.ModelError) as caught:
         pc.load(path, **options)

@@ -253,7 +253,7 @@ def test_a_state_brings_its_velocity_and_precisions_agree():
 
 
 def test_far_from_the_base_what_is_near_keeps_its_digits():
-    """Two frames of one arm, the whole 10⁹ m away at 7 km/s: the way between them does not go by the base."""
+    """Two frames of one arm, the whole 10⁹ m away at 7 km/s: the path between them does not include the base."""
     model = pc.Multibody("far")
     solid = dict(mass=1.0, inertia=np.eye(3))
     model.add_body("bus", hinge="free", **solid)

@@ -120,7 +120,7 @@ def test_only_loose_frames_are_edited(arm):
 
 
 def test_what_a_body_takes_with_it(arm):
-    """A removed body leaves its loose frames standing on nothing: they say so until they are put elsewhere."""
+    """A removed body leaves its loose frames without a carrier: they raise an error until they are attached elsewhere."""
     arm.remove_body("body2")
     for question in (lambda: arm.frame("bit").pose(), lambda: arm.frame("body0").velocity(wrt="tool"), lambda: arm.frame("tool").on):
         words = "frame 'tool' of 'chain of 3 rods' stood on 'body2', which is no longer there: attach it to another frame, or remove it"
@@ -230,8 +230,8 @@ def test_coordinates_that_are_not_there(arm):
         ([3], "coordinate 3 of 'chain of 3 rods', which has 3"),
         ([-1], "coordinate -1 of 'chain of 3 rods', which has 3"),
         (["hinge0", 0], "coordinate 'hinge0' of 'chain of 3 rods' is named twice"),
-        ([1.0], "a coordinate of 'chain of 3 rods': a whole number, not 1.0"),
-        (2.5, "a coordinate of 'chain of 3 rods': a whole number, not 2.5"),
+        ([1.0], "a coordinate of 'chain of 3 rods' must be a whole number, not 1.0"),
+        (2.5, "a coordinate of 'chain of 3 rods' must be a whole number, not 2.5"),
     ]:
         with refused(pc.ModelError, words):
             frame.jacobian(coordinates=given)

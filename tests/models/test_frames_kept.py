@@ -1,4 +1,4 @@
-"""What is computed of frames at the present state, and when: counted. And what is kept is right after every change."""
+"""Computations for frames at the present state are counted, and cached results are right after every change."""
 
 import copy
 import pickle
@@ -20,7 +20,7 @@ def chain():
 
 
 class Counted:
-    """What a block of statements computed."""
+    """Return the counts of a block of statements."""
 
     def __init__(self, model):
         self.frames = model.frames

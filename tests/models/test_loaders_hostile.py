@@ -23,7 +23,7 @@ def test_the_campaign():
 
 @pytest.fixture
 def says(tmp_path):
-    """What loading a text is refused with, the path taken off."""
+    """Return the error of loading a text, without the path."""
 
     def refused(text, **options):
         path = tmp_path / "robot.urdf"

@@ -1,4 +1,4 @@
-"""What loops refuse, each by name and with what would do; nothing is left of what was refused."""
+"""Refusals of loops, each by name and with the remedy; a refused loop leaves nothing behind."""
 
 import numpy as np
 import pytest

@@ -69,9 +69,7 @@ def test_rows_come_back(tmp_path, kind, recwarn):
         scale = 1.0
         if "gear" in kind or kind == "one joint":  # written as solved for one coordinate
             scale = -r[0] / R[0] if abs(r[0] + R[0]) < abs(r[0] - R[0]) else r[0] / R[0]
-        if kind.startswith(
-            "weld"
-        ):  # their place is read back as that of the body, and not of the site: turns are the same where it is open
+        if kind.startswith("weld"):  # their place is read back as the body's, not the site's: rotations are the same where it is open
             r, R = r[:3], R[:3]
         assert abs(np.linalg.norm(r) - abs(scale) * np.linalg.norm(R)) < AGREE * (1 + np.linalg.norm(r))
         lengths = [

@@ -1,4 +1,4 @@
-"""What parts share with the whole, how long, and what is refused."""
+"""Data that parts share with the whole, their lifetime, and refusals."""
 
 import copy
 import pickle
@@ -336,7 +336,7 @@ def test_programs_and_prepared_calls_of_parts(seed):
 
 
 def test_a_part_that_its_carrier_moves_accelerates_as_in_the_whole():
-    """Hybrid dynamics with the base's motion prescribed, the carrier's in the whole: the same accelerations; in a batch, too."""
+    """Hybrid dynamics with the base's motion prescribed, the carrier's in the whole: the same accelerations; also in a batch."""
     robot = pc.tree([-1, 0, 1, 0, 3, 0, 5], ["free", "pin", "ball", "pin", "ball", "universal", "pin"], seed=1)
     robot.gravity = (0.5, -1.0, -9.81)
     tau = np.random.default_rng(0).uniform(-1, 1, robot.nv)

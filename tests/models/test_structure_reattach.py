@@ -36,7 +36,7 @@ def branched(kind, seed):
 @pytest.mark.parametrize("new", KINDS)
 @pytest.mark.parametrize("old", KINDS)
 def test_every_kind_to_every_kind_elsewhere(old, new):
-    """Onto a body of the other branch; the body, which is at rest to it but for what an old free hinge gives it, keeps pose and twist."""
+    """Onto a body of the other branch; the body, at rest relative to it except for an old free hinge's motion, keeps pose and twist."""
     seed = 11 * KINDS.index(old) + KINDS.index(new)
     rng = np.random.default_rng(seed)
     model, options = branched(old, seed), options_of(new, rng)

@@ -17,7 +17,7 @@ THREE = "write three finite numbers: [x, y, z]"
 
 @pytest.fixture
 def says(tmp_path):
-    """What loading a text is refused with, the path taken off."""
+    """Return the error of loading a text, without the path."""
 
     def refused(text, **options):
         path = tmp_path / "m.toml"

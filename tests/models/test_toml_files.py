@@ -128,7 +128,7 @@ def test_a_model_of_a_mujoco_file(tmp_path):
 
 @pytest.mark.peers
 def test_springs_and_actuators_of_a_mujoco_file(tmp_path):
-    """Where springs are slack goes by the coordinates q, which a ball has more of; actuators that are no effects keep their reason."""
+    """Rest positions of springs have the size of q, which is larger for a ball; actuators that are no effects keep their reason."""
     pytest.importorskip("mujoco")
     text = (
         '<mujoco model="m"><compiler angle="radian"/><worldbody><body name="a"><joint name="ball" type="ball" stiffness="2"/>'

@@ -1,4 +1,4 @@
-"""Shapes of a TOML file: written and read bit for bit, of hand-written files too; what no file holds is told."""
+"""Shapes of a TOML file: written and read bit for bit, also from hand-written files; shapes that no file holds are reported."""
 
 import os
 import warnings

@@ -1,4 +1,4 @@
-"""What TOML files are made of: angles that give a rotation to the last bit, and documents that the standard library reads."""
+"""Parts of TOML files: angles that give a rotation to the last bit, and documents that the standard library reads."""
 
 import sys
 

@@ -123,7 +123,7 @@ def test_joint_types(load, kind, hinge, nq, nv):
     assert (model.hinges["j"].kind, model.nq, model.nv) == (hinge, nq + 1, nv + 1)
     check_against_oracle(model)
     inner = load(link("r"), *parts, joint("root joint", "r", "a"))
-    assert (inner.hinges["j"].kind, inner.nv) == (hinge, nv + 2)  # a floating joint in the middle, too
+    assert (inner.hinges["j"].kind, inner.nv) == (hinge, nv + 2)  # also a floating joint in the middle
     check_against_oracle(inner)
 
 

@@ -83,7 +83,7 @@ def test_robots_of_the_package(tmp_path, name, root, welds):
 
 
 def test_a_free_root_may_be_asked_for(tmp_path):
-    """A file that says so itself is not made free twice."""
+    """A file with its own floating root is not made free twice."""
     robot = pc.robots.a1()
     robot.save(tmp_path / "a1.urdf")
     for root in ("fixed", "free"):

@@ -15,7 +15,7 @@ from . import switches
 
 
 def copy_of_tree(root, tree):
-    """What git lists, and no source or test that an earlier copy had and that is gone."""
+    """Copy the files that git lists, and remove sources and tests of an earlier copy that no longer exist."""
     listed = ["git", "-C", str(root), "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
     names = {n for n in subprocess.run(listed, check=True, capture_output=True, text=True).stdout.split("\0") if (root / n).is_file()}
     for name in names:

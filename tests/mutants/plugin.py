@@ -57,7 +57,7 @@ assert pycraft.__file__.startswith(str(TREE)), pycraft.__file__
 
 
 class Notes:
-    """What every test touches, its setup counted to all tests of the file: fixtures are shared."""
+    """Record the code that every test touches; setup counts for all tests of the file, because fixtures are shared."""
 
     def __init__(self, path):
         self.path, self.tests, self.setup, self.before = path, {}, {}, time.process_time()
@@ -121,7 +121,7 @@ class Named:
 
 
 class Red:
-    """What failed, written at once: a test that ends the process has begun and is the last to have done so."""
+    """Write failures at once: a test that ends the process is the last that has begun."""
 
     def __init__(self, path):
         self.path = pathlib.Path(path)

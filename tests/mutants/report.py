@@ -20,7 +20,7 @@ def table(mutants, results, seconds, options):
         "",
         f"Seed {options.seed}; {options.budget:.0f} s of tests for a mutant at most; {seconds / 60:.0f} min with {options.jobs} jobs."
         + " Changes of Python alone." * options.python
-        + " Of the tests those of the areas of what was tried." * options.areas,
+        + " Only tests of the areas of the tried mutants." * options.areas,
         "",
         "| | killed | survived | of them explained | executed by no test |",
         "|---|---|---|---|---|",

@@ -1,4 +1,4 @@
-"""Which tests meet which mutants, and what became of them."""
+"""Tests that meet each mutant, and their results."""
 
 import concurrent.futures
 import hashlib
@@ -46,7 +46,7 @@ def contents(root, *patterns):
 
 
 def everywhere(tree):
-    """What any test may depend on: the package, and what tests share."""
+    """Return the sources that any test may depend on: the package, and shared test code."""
     return contents(tree, "pycraft/**/*.py", "tests/conftest.py", "tests/support/*.py", "tests/campaigns/*.py")
 
 
@@ -80,7 +80,7 @@ class Run:
     lines: list  # "began name", "red name"
 
     def by(self):
-        """What turned red: a test, or how the run ended. Nothing where the tests passed, or where there were none of them."""
+        """Return the failure: a test, or the end of the run. None if the tests passed, or if there were none."""
         red = [line.removeprefix("red ") for line in self.lines if line.startswith("red ")]
         begun = [line.removeprefix("began ") for line in self.lines if line.startswith("began ")]
         if red or self.status in (0, pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.NO_TESTS_COLLECTED):
@@ -118,7 +118,7 @@ def pytest_run(build, files, seconds, tests=None, first=False, **environment):
 
 
 def noted(build, mutants, options, show):
-    """What every everyday test touches, with its seconds; those that are red already are left out."""
+    """Return the code that every everyday test touches, with its seconds; tests that already fail are excluded."""
     begin, files = time.perf_counter(), sorted(p for p in (build.tree / "tests").rglob("test_*.py") if p.name not in SKIPPED_FILES)
     if options.dozen or options.areas:
         wanted = DOZEN_TESTS if options.dozen else {name for m in mutants for name in AREAS.get(m.file, ())}

@@ -109,7 +109,7 @@ def test_written_out(name):
 
 
 def test_bodies_and_coordinates_of_each_set():
-    """Overlapping loops are one node; what is on two roots is, too; what hangs outboard is no part of it."""
+    """Overlapping loops form one node, and so do loops on two roots; outboard bodies are not part of it."""
     names = two_loops().soa.embedded()._source.body_names
     assert names == ["body0+body1+body2+body3+body4+body5", "body6+body7+body8"]
     source = spatial().soa.embedded()._source

@@ -1,6 +1,6 @@
 """Relative Jacobians as expressions: against the arrays of frames, their derivatives against differences, without a dense step.
 
-An expression goes by the world's axes: its error is the rounding of poses and motions there, within metres, through two chains of at most
+An expression uses the world's axes: its error is the rounding of poses and motions there, within metres, through two chains of at most
 six bodies, some thousand roundings, with X⁻¹ beside: 2·10⁴ eps of the largest entry, beside 1.
 """
 

@@ -26,7 +26,7 @@ FORMULAS = [
 
 
 def flattened(latex):
-    """What `in_lines` was given: without environments and line ends, and without spaces of all sorts."""
+    """Return the input of `in_lines`: without environments and line ends, and without spaces of all sorts."""
     bare = re.sub(r"\\begin\{aligned\}& |\\end\{aligned\}|\\\\\n& (?:\\quad )*(?:\{\})?", "", latex)
     return re.sub(r"\s|\\quad", "", bare)
 

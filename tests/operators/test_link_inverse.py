@@ -119,7 +119,7 @@ def test_recorded_states_decide_for_themselves():
 
 @pytest.mark.parametrize("name", REGULAR)
 def test_hostile_but_regular(name):
-    """What the general recursions solve is solved, by one way or the other: beside quad precision no worse than ten times."""
+    """Cases that the general recursions solve are solved by either method, with at most ten times the error against quad precision."""
     model = at_random_state(REGULAR[name]())
     e, x, q = inverse_of(model), np.ones(model.nv), model.q
     exact = np.asarray(e.at(q, precision="quad") @ x, float)

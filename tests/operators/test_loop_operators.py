@@ -1,6 +1,6 @@
 """Rows of loops as operators: against the arrays of `model.loops`, which have an oracle of their own; derivatives against Q̇θ̇, differences.
 
-Rounding: Q is the arrays' own numbers. A B*φ*H* goes by the world's axes, as relative Jacobians do: 2·10⁴ eps of the largest entry beside 1
+Rounding: Q is the arrays' own numbers. A B*φ*H* uses the world's axes, as relative Jacobians do: 2·10⁴ eps of the largest entry beside 1
 (test_frame_operators.py), and so do derivatives, times what rows divide by: the half cosine between axes, cubed, above 0.1.
 """
 

@@ -161,7 +161,7 @@ def test_embedded_along_coordinates(name):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_embedded_along_time(name):
-    """What depends on v: θ̇_r stays along coordinates, and goes on at θ̈_r along time."""
+    """Quantities that depend on v: θ̇_r is fixed along coordinates, and changes with θ̈_r along time."""
     model = MODELS[name]()
     soa = model.soa.embedded()
     names, X, v = soa._source.coordinate_names, soa.X_r.dense(), np.array(model.v)

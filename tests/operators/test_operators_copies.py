@@ -1,4 +1,4 @@
-"""What outlives what: stale operators after edits, node operators after new nodes, copies and pickles, threads."""
+"""Lifetimes: stale operators after edits, node operators after new nodes, copies and pickles, threads."""
 
 import concurrent.futures
 import copy

@@ -1,5 +1,5 @@
-"""What operators refuse, each by its text: wrong products, numbers and arrays beside operators, two models, sizes; and what
-equality, hash, transposition and spaces are (rulings 3 to 5)."""
+"""Refusals of operators, each by its text: wrong products, numbers and arrays beside operators, two models, sizes; and
+equality, hash, transposition and spaces."""
 
 import warnings
 

@@ -26,7 +26,7 @@ def model(request):
 def bound(model, name, X):
     """Of rounding. A sweep applies one block E, H or M after another, each of at most a dozen products, whose numbers are rounded as
     often: 40 roundings a body on the way from one end to the other, each of it no more than the same sweep makes of magnitudes. Those of
-    ψ hang on G, whose rounding is that of ℳ⁻¹, see test_many_columns.py."""
+    ψ depend on G, with the rounding of ℳ⁻¹, see test_many_columns.py."""
     E, H, M, J = (np.abs(letter.dense()) for letter in model.soa("E H M J"))
     sweep = np.linalg.inv(np.eye(len(E)) - E)  # exact zeros beside: E is nilpotent
     if name in ("ψ", "ψ*"):
@@ -122,7 +122,7 @@ def test_instruction_sets_agree(tmp_path):
 
 
 def test_what_an_operator_from_outside_changes_is_not_seen():
-    """A product reads its array where it lies, but for one that calls a function that might write to it."""
+    """A product reads its array in place, except one that calls a function that might write to it."""
     model = TREES["along axes"]
     MM, x = sweeps_of(model)["ℳ"], np.linspace(-1, 1, model.nv)
     wanted = x + MM @ x

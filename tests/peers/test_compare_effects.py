@@ -50,7 +50,7 @@ def test_what_is_not_read_is_no_agreement(loaded, name):
 @pytest.mark.peers
 @pytest.mark.parametrize("name", EVERY)
 def test_a_plain_model_beside_every_file(loaded, name):
-    """Where MuJoCo's accelerations differ from those of the plain file, the reason named is an effect, and no mass, axis or placement."""
+    """If MuJoCo's accelerations differ from the plain file's, the reason named is an effect, and no mass, axis or placement."""
     import mujoco
 
     if EVERY[name].get("kind", "hinge") != "hinge":

@@ -1,4 +1,4 @@
-"""What `pycraft bench --peers` times of other packages is what ours compute: every call, on arms, a free base and a chain."""
+"""Calls of other packages timed by `pycraft bench --peers` compute the same as ours: every call, on arms, a free base and a chain."""
 
 import sys
 

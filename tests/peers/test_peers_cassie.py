@@ -37,7 +37,7 @@ def test_it_is_closed_as_published_and_its_rods_to_the_feet_ask_one_row_too_many
 def test_both_ways_and_pinocchio_give_the_same_accelerations(robot):
     """Eps times the condition of Q ℳ⁻¹ Q*: rods of 0.5 m beside cranks of 5 cm, singular values down to 1e-3, squared.
 
-    Pinocchio's proximal steps factor the rows that hang together, too: rounding over μ is what is left, 1e-3 at 1e-10 and 1e-5 at 1e-5.
+    Pinocchio's proximal steps also factor dependent rows: an error of rounding over μ remains, 1e-3 at 1e-10 and 1e-5 at 1e-5.
     """
     from support.pinocchio_linkages import Twin
 

@@ -1,6 +1,6 @@
 """Frames against Pinocchio: LOCAL, LOCAL_WORLD_ALIGNED and WORLD are ours "body", "aligned" and "world" relative to the base.
 
-Pinocchio's rates of Jacobians are those of the numbers in each of these axes, as ours; its spatial acceleration in LOCAL_WORLD_ALIGNED is
+Pinocchio's rates of Jacobians are rates of the entries in each of these axes, as ours; its spatial acceleration in LOCAL_WORLD_ALIGNED is
 the local one in the world's axes, as ours; the classical one v̇ + ω × v of each. Of two frames that move, Pinocchio's differences are formed
 here by its own actions: J_a - Ad(X_ab) J_b, and the rate of that, with d/dt Ad(X) = Ad(X) ad(V).
 
@@ -22,7 +22,7 @@ CASES = [(robot, root) for robot in ROBOTS for root in ("fixed", "free")]
 
 
 class Theirs:
-    """What Pinocchio says of the frames of a pair of models at its state, angular first and over our coordinates."""
+    """Return Pinocchio's values for the frames of a pair of models at its state, angular first and over our coordinates."""
 
     def __init__(self, pair):
         self.pair, self.model, self.data = pair, pair.pin_model, pair.pin_model.createData()

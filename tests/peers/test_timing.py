@@ -1,4 +1,4 @@
-"""What `pycraft bench --peers` measures: ratios, exponents, clocks, models, and that a wrong result is refused."""
+"""Measurements of `pycraft bench --peers`: ratios, exponents, clocks, models, and that a wrong result is refused."""
 
 import json
 import os

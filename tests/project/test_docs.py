@@ -1,4 +1,4 @@
-"""What the documents say is so: the operator table is complete, examples in docstrings and in the README run."""
+"""The documents are correct: the operator table is complete, examples in docstrings and in the README run."""
 
 import doctest
 import importlib
@@ -202,7 +202,7 @@ def test_no_machine_or_package_host_in_tracked_text():
 
 def test_troubleshooting_knows_every_class_of_error():
     """Those that a user meets; with what else each is, as Python says."""
-    for path in (ROOT / "pycraft").rglob("*.py"):  # classes of rooms that are imported when they are called
+    for path in (ROOT / "pycraft").rglob("*.py"):  # classes of modules that are imported on first use
         if "(_core.Error" in (text := path.read_text(encoding="utf-8")) or re.search(r"class \w+\((_core\.)?\w*Error", text):
             importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
     found, todo = set(), [pycraft.Error]

@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "extending.md").read_text()
 EXAMPLES = {"X_world": 7, "universal": 3, "screw": 7, "Eφ = φ-I": 1, "CoulombFriction": 7, "lyapunov_blocks": 5}
-"""What is followed, and in how many files."""
+"""The examples, and the number of their files."""
 
 
 def files_of(example):

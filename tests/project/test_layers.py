@@ -13,7 +13,7 @@ import pytest
 ROOT = pathlib.Path(__file__).parents[2]
 CPP, PYTHON = ROOT / "cpp", ROOT / "pycraft"
 
-# The rooms of C++, each with what it may include besides itself; what that may include, it may, too.
+# The modules of C++, each with the modules that it may include directly; it may also include all that these may include.
 STANDS_ON = {
     "runtime": [],
     "lanes": ["runtime"],
@@ -94,7 +94,7 @@ def imports(path):
 
 
 def room_of(name):
-    """The room of a file named from cpp/."""
+    """Return the module of a file named from cpp/."""
     parts = name.split("/")
     return "/".join(parts[:2]) if parts[0] == "algebra" else parts[0]
 
@@ -222,8 +222,8 @@ def test_what_takes_long_to_import_is_imported_where_it_is_used():
             assert not slow, f"{path.relative_to(ROOT)}:{node.lineno}"
 
 
-# The rooms of Python, each with what it may import besides itself, at the top of a file, inside a function or for types alone; what that
-# may import, it may, too. A module that stands beside the rooms is one of its own.
+# The modules of Python, each with the modules that it may import directly, at the top of a file, inside a function or only for types; it
+# may also import all that these may import. A file beside the folders is a module.
 RESTS_ON = {
     "_core": [],
     "closed": ["_core"],
@@ -286,7 +286,7 @@ def python_room(path):
 
 
 def printed(code):
-    """What a process of its own prints."""
+    """Return the output of a separate process."""
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 
 
@@ -342,7 +342,7 @@ def test_python_imports_point_one_way(room):
 
 
 def test_the_core_imports_none_of_the_package():
-    """What it calls back for is attached by pycraft/face.py; `pycraft._core` is the core itself."""
+    """pycraft/face.py attaches the functions that the core calls; `pycraft._core` is the core itself."""
     for path in sources("bindings") + sources("bench"):
         for name in re.findall(r'(?:import_?|module_::import)\("(pycraft[^"]*)"\)', path.read_text(encoding="utf-8")):
             assert name == "pycraft._core", f"{path.relative_to(ROOT)} imports {name}"
@@ -368,7 +368,7 @@ def test_what_tests_share_is_in_support():
 
 
 def test_no_two_test_files_share_a_name():
-    """What the everyday subset leaves out is told by the name of the file."""
+    """The everyday subset excludes tests by the name of their file."""
     names = [path.stem for path in (ROOT / "tests").rglob("test_*.py")]
     assert sorted(names) == sorted(set(names))
 
@@ -389,7 +389,7 @@ def test_nothing_prints_but_the_command_line():
 
 
 def test_every_exception_to_a_check_says_why():
-    """`noqa: code - why`, `type: ignore[code]  # why`; what is skipped is told by the call itself."""
+    """`noqa: code - why`, `type: ignore[code]  # why`; calls that skip tests give the reason themselves."""
     exception = re.compile(r"# (noqa|type: ignore|pragma)\b(?P<rest>.*)")
     reasoned = re.compile(r"(: [A-Z]+\d+(, [A-Z]+\d+)* - \w+|\[[\w-]+\]  # \w+)")
     paths = [path for folder in ("pycraft", "tests", "cpp") for path in sorted((ROOT / folder).rglob("*.py"))]

@@ -13,7 +13,7 @@ from making.offline import asked_of_others
 FOLDER = Path(__file__).parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 LONGEST = 120.0
-"""Seconds, of a reader's patience; on a machine with two cores that do other things, too."""
+"""Seconds that a reader waits, on a busy machine with two cores."""
 
 
 def test_there_are_notebooks():

@@ -1,4 +1,4 @@
-"""What other packages call things: the table behind errors, and the page of it."""
+"""Names of other packages: the table behind errors, and its page."""
 
 import importlib
 import re

@@ -1,4 +1,4 @@
-"""What needs a package of the extra [peers] says so: unmarked, it is skipped without those packages, and left out with them."""
+"""Tests that need a package of the extra [peers] are marked: unmarked, they are skipped without those packages, and excluded with them."""
 
 import ast
 from pathlib import Path

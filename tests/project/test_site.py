@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def configured():
-    """What conf.py says, as far as it is constants."""
+    """Return the constants that conf.py sets."""
     tree = ast.parse((ROOT / "docs" / "making" / "conf.py").read_text())
     found = {}
     for node in tree.body:
@@ -49,7 +49,7 @@ def test_no_link_is_dead(path):
 
 
 def test_a_page_of_the_site_links_to_pages_of_the_site():
-    """A link that is alive in the repository alone would be dead in the site: what is linked to is listed, too."""
+    """A link that works only in the repository would be dead in the site: linked pages are also listed."""
     listed = set(contents.listed())
     for path in contents.committed():
         for target in contents.links(path):

@@ -37,7 +37,7 @@ def test_functions(room):
 
 
 def without_templates(head):
-    """What stands before a brace, on one line, less labels and `template <...>`."""
+    """Return the text before a brace, on one line, without labels and `template <...>`."""
     head = re.sub(r"\b(public|private|protected):(?!:)", " ", " ".join(head.split())).strip()
     while opening := re.match(r"template ?<", head):
         depth, end = 1, opening.end()

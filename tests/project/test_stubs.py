@@ -1,4 +1,4 @@
-"""The committed stubs are those of the compiled core."""
+"""The committed stubs match the compiled core."""
 
 import importlib.util
 import pathlib

@@ -189,7 +189,7 @@ def test_the_single_dof_form_is_not_proved_for_other_hinges():
 
 
 def test_theorems_of_the_core_are_proved_or_not_found_never_wrong():
-    """All of `soa.theorems()`: those of the tree's algebra are proved but for traces, determinants and re-rooting."""
+    """All of `soa.theorems()`: theorems of the tree's algebra are proved, except traces, determinants and re-rooting."""
     model = meeting([CONSTANT, J0], 1)
     groups = "Spatial operators, Composite-body inertia, Articulated-body inertia, φ, ψ, K, H, Mass matrix, Operational space"
     not_words = {"perturbed inertias, relative error in the ℳ norm", "Ω decomposed by Υ, blocks on one path"}

@@ -1,4 +1,4 @@
-"""What may be assumed and defined in a proof, and statements of compliances, diagonal blocks, nodes and roots."""
+"""Assumptions and definitions in a proof, and statements about compliances, diagonal blocks, nodes and roots."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_what_is_assumed_is_used_and_said(text, assume, hypotheses, presupposed)
 @pytest.mark.parametrize(
     "text, assume, says",
     [
-        ("φ = ψ", ["D = 0"], "D = 0, which is assumed, holds on no model"),
+        ("φ = ψ", ["D = 0"], "the assumption D = 0 holds on no model"),
         ("φ = ψ", ["H = 0"], "holds on no model"),
         ("E_φ⁻¹ E_φ = I", ["E_φ > 0"], "(E_φ)⁻¹, which exists on no model"),
         ("C : Θ → Θ; C = C*", [], "no proof found"),
@@ -84,8 +84,8 @@ def test_only_a_constant_of_bodies_on_the_base_does_not_see_the_tree():
         ("A = I; φ = ψ", {}, "is no definition"),
         ("2a := φ; φ = φ", {}, "no name for a letter"),
         ("A := φ = ψ; A = A", {}, "is a statement"),
-        ("φ = φ", {"assume": ["φ"]}, "is assumed"),
-        ("φ = φ", {"assume": "J"}, "is assumed"),
+        ("φ = φ", {"assume": ["φ"]}, "assumption 'φ': write"),
+        ("φ = φ", {"assume": "J"}, "assumption 'J': write"),
         ("A := H φ P; A A = A", {}, "cannot follow"),
         ("φ", {}, "one side"),
     ],
@@ -277,7 +277,7 @@ def test_no_false_derivative_is_proved(text):
     "text, says",
     [
         ("∂_t φ + ∂_iφ = ∂_jφ", "along one and time"),
-        ("∂∂∂φ = φ", "beyond the second"),
+        ("∂∂∂φ = φ", "first and second derivatives"),
         ("∂3 φ = φ", "not understood"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What proofs rest on: axioms that hold in numbers, lemmas proved from what stands above them, rules whose overlaps all resolve."""
+"""Foundations of proofs: axioms that hold numerically, lemmas proved from earlier ones, rules whose overlaps all resolve."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_a_lemma_that_cites_itself_or_a_later_one_is_refused(monkeypatch):
     for word, cited in (("φ E_φ", "φ E_φ = φ − I"), ("E_φ", "E_ψ = E_φ − K H")):
         fresh = Theory()
         fresh._lemmas = {**fresh._lemmas, "φ E_φ = φ − I": [(word, cited)]}
-        with pytest.raises(AssertionError, match="does not stand above it"):
+        with pytest.raises(AssertionError, match="is not an earlier lemma"):
             fresh("φ E_φ = φ − I")
     a = Equation("lemma", "a", parse("φ"), parse("ψ"))
     b = Equation("lemma", "b", parse("ψ"), parse("φ"), uses=[a])

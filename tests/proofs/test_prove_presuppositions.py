@@ -118,7 +118,7 @@ def test_an_answer_may_presuppose_what_exists_and_says_so():
 
 def test_the_number_of_coordinates_is_no_number_of_one_model(arm):
     for model in (None, arm):
-        with pytest.raises(pc.EvaluationError, match="differs from model to model"):
+        with pytest.raises(pc.EvaluationError, match="differs between models"):
             prove("N*D == 7*D", model)
 
 

@@ -102,7 +102,7 @@ def test_the_budget_is_cpu_time_and_its_end_is_said(monkeypatch):
     assert not pc.repair("D = HPH", most=1).ended
     monkeypatch.setattr(Budget, "left", 1e9)
     monkeypatch.setattr(Budget, "over", True)
-    assert re.search(r": [1-9]\d* formulas that hold on small chains were not looked at", pc.repair("D = HPH").ended)
+    assert re.search(r": [1-9]\d* formulas that hold on small chains were not examined", pc.repair("D = HPH").ended)
 
 
 def test_a_false_statement_is_not_searched_in_silence():
@@ -149,7 +149,7 @@ TEXTS = [
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_formula_is_what_the_statement_is(text):
-    """Read as a tree, written, read as a statement: the same values; and the dense value is that of the expression."""
+    """Read as a tree, written, read as a statement: the same values; and the dense value equals the expression's."""
     model, dense = letters()
     formula = read_formula(text)
     typed, again = Statements(model.soa).read(text), Statements(model.soa).read(written_statement(formula))

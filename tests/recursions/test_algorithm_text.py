@@ -113,7 +113,7 @@ def test_what_is_refused():
 
 
 def test_the_document_shows_what_is_written():
-    """The outputs in docs/algorithm.md are those of the package."""
+    """The outputs in docs/algorithm.md match the package."""
     text = (Path(__file__).parents[2] / "docs" / "algorithm.md").read_text(encoding="utf-8")
     code, *shown = (block.removeprefix("python\n") for block in re.findall(r"```(.*?)```", text, re.S)[:3])
     names = {}

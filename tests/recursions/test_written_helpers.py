@@ -1,4 +1,4 @@
-"""What written programs bring along (pycraft/recursions/runtime): each function against NumPy, and what is copied."""
+"""Support code of written programs (pycraft/recursions/runtime): each function against NumPy, and the copied parts."""
 
 import ast
 import builtins

@@ -1,4 +1,4 @@
-"""What written programs in C++ bring along: headers that compile by themselves, and compute what the Python ones compute."""
+"""Support code of written C++ programs: headers that compile alone, and compute the same as the Python ones."""
 
 import subprocess
 from pathlib import Path

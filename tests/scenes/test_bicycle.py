@@ -77,7 +77,7 @@ def test_speeds_between_which_it_keeps_upright():
 
 
 def test_it_rights_itself_as_the_linear_model_says():
-    """A push of 0.01 rad/s at 5 m/s: the nonlinear motion is the linear one but for squares of the push."""
+    """A push of 0.01 rad/s at 5 m/s: the nonlinear motion is the linear one up to squares of the push."""
     from scipy.linalg import expm
 
     push, times = 1e-2, np.array([0.3, 0.6, 1.0])

@@ -20,7 +20,7 @@ def options(integrator, step=2e-4, rtol=1e-10, atol=1e-12):
 
 
 def error_of(integrator, step=2e-4):
-    """What steps of one size leave in motions of the size and rate one: a few h^p."""
+    """Error of fixed steps in motions of size and rate one: a few h^p."""
     return 20 * step ** FIXED[integrator] + 1e-8 if integrator in FIXED else 3e-6
 
 

@@ -35,7 +35,7 @@ def test_hermites_order(case):
 
 @pytest.mark.parametrize("case", ["double pendulum", "spinning"])
 def test_the_order_of_the_dense_output_of_dop853(case):
-    """It is a polynomial of degree 7 with local errors O(h⁸), as those of the steps add up to."""
+    """It is a polynomial of degree 7 with local errors O(h⁸), like the steps' accumulated errors."""
     found = errors_between(CASES[case](), "dop853", (8, 16, 32) if case == "double pendulum" else (2, 4, 8))
     orders = np.log2(found[:-1] / found[1:])
     assert (orders[-1] > 7).all() and found[-1].max() < 1e-9, (found, orders)
@@ -110,17 +110,17 @@ def test_of_a_run_that_was_pickled():
     times = np.linspace(0, 0.5, 41)
     assert np.abs(again.at(times).q - run.at(times).q).max() < 1e-6
     assert again.checkpoint() == run.checkpoint() and again.statistics == run.statistics
-    with pytest.raises(pc.EvaluationError, match="no scene behind it"):
+    with pytest.raises(pc.EvaluationError, match="this motion has no scene"):
         print(again.at(0.2).vdot)
 
 
 def test_what_is_not_there():
     run = pc.mechanisms.pendulum().simulate(1.0, t_eval=[0.5, 1.0], dense=False)
-    with pytest.raises(pc.EvaluationError, match="kept the times of t_eval alone; simulate with dense=True"):
+    with pytest.raises(pc.EvaluationError, match="kept only the times of t_eval; simulate with dense=True"):
         run.at(0.7)
     run = pc.mechanisms.pendulum().simulate(1.0)
     for t in (-0.1, 1.2, np.nan):
-        with pytest.raises(pc.EvaluationError, match=f"t = {t:g} s is not in the run, which goes from 0 to 1 s"):
+        with pytest.raises(pc.EvaluationError, match=f"t = {t:g} s is outside the run, which lasts from 0 to 1 s"):
             run.at(t)
 
 

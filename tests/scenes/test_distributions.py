@@ -1,4 +1,4 @@
-"""What thermostats sample against the exact densities: √det(ℳ + J) exp(-H/kT), and exp(-H/kT) of configurations with the Fixman potential.
+"""Samples of thermostats against the exact densities: √det(ℳ + J) exp(-H/kT), and exp(-H/kT) of configurations with the Fixman potential.
 
 Runs are independent (seeds, starts), so that means over them have known errors: a mean is within SIGMAS standard errors of the exact one,
 and tests of Kolmogorov and Smirnov have a probability above LIKELY; the density that it would be without the effect is out of reach.

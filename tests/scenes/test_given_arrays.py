@@ -1,4 +1,4 @@
-"""What effects, functions of time, models, hinges and bodies are given is copied, and what they give out can't be written."""
+"""Effects, functions of time, models, hinges and bodies copy their inputs, and their arrays are read-only."""
 
 import copy
 import pickle
@@ -76,7 +76,7 @@ def test_numbers_that_the_user_changes_later(name, form):
 
 
 def said(effect):
-    """What it computes, and what of it is saved, in bytes."""
+    """Return its results, and its saved data, in bytes."""
     if not isinstance(effect, E.Effect):
         return effect(0.4).tobytes(), repr(effect.to_dict())
     model = pc.chain(2, seed=1)
@@ -120,7 +120,7 @@ def refuses_changes(value):
 
 
 def changes_in_place(kind, name, one):
-    """Whether a method of a list or dictionary changes it, with some arguments."""
+    """Check for methods of a list or dictionary that change it, with some arguments."""
     for arguments in ((), (0,), ("a",), (one,), (0, 2.0), ("a", 2.0), ("b", 2.0), (2,), (1.0,), ({"b": 1.0},)):
         thing = kind([3.0, 1.0]) if kind is list else kind(one)
         before = repr(thing)

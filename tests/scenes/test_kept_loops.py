@@ -1,6 +1,6 @@
 """Scenes on loops against closed forms and published benchmarks; energy, drift, redundant rows, singular states; what is refused.
 
-Tolerances: where nothing is said, a hundred times that of the run's steps, the errors of which add up over the motion.
+Tolerances: unless stated otherwise, a hundred times the tolerance of the run's steps, because errors add up over the motion.
 """
 
 import numpy as np
@@ -228,7 +228,7 @@ def test_steps_that_leave_the_loops_are_refused(method):
 
 
 def test_both_methods_agree_at_a_state():
-    """Every mechanism, moving, under forces that are drawn: θ̈ is one, whatever the way; of rows that are independent λ, too."""
+    """Every mechanism, moving, under forces that are drawn: θ̈ does not depend on the method, nor does λ of independent rows."""
     for name in MECHANISMS:
         scene = getattr(M, name)()
         model, rng = scene.model, np.random.default_rng(5)
@@ -270,7 +270,7 @@ def test_embedded_loops_carry_bodies_without_mass():
 
 
 def test_embedded_loops_at_a_singular_state_beside_rotors_and_a_coupling():
-    """At the flat four-bars, where a row hangs on others, and with hinges that gears tie."""
+    """At the flat four-bars, where a row depends on others, and with hinges coupled by gears."""
     bars = linkages.n_four_bar(2)
     flat, v = np.zeros(5), np.array([1.0, -1, 1, -1, 1])
     said = pc.Scene(bars).add(E.Gravity((0, -9.81, 0)), E.RotorInertia(0.2), E.Loop(method="embed")).evaluate(flat, v)

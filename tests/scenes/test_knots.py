@@ -154,7 +154,7 @@ def test_wider_precisions(precision):
 
 
 def test_a_run_that_starts_within_and_at_the_last_knot():
-    """What a table says there is what follows: nothing moves on."""
+    """The value of a table there is used from then on: nothing continues to move."""
     b = slider()
     held = pc.Scene(b).add(E.Prescribed("b", E.Table([-1.0, 0.0], [0.0, 2.0])))
     run = held.simulate(1.0, [0.0], [0.0], **P)
@@ -164,7 +164,7 @@ def test_a_run_that_starts_within_and_at_the_last_knot():
 
 
 def test_a_motor_and_a_wrench():
-    """Of every effect that a function of time drives."""
+    """Knots of every effect that a function of time drives."""
     model = slider()
     command = E.Table([4.99, 5.0, 5.01], [0, 1.0, 0])
     motor = pc.Scene(model).add(E.Motor(command, 100.0, 1e12)).simulate(10.0, [0.0], [0.0], **P)

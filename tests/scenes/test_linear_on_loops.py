@@ -1,4 +1,4 @@
-"""Linear models on loops: closed forms, differences of constrained dynamics along states on the loops, what is told and refused.
+"""Linear models on loops: closed forms, differences of constrained dynamics along states on the loops, errors and refusals.
 
 Tolerances: of fourth-order differences at h = 2⁻⁸ the truncation is h⁴/30 of a fifth derivative, 1e-11 where that is of the function's own
 size; states are doubles taken onto the loops to rounding, which the difference divides by h.
@@ -127,7 +127,7 @@ def test_frequencies_of_four_bars_are_those_of_one_pendulum():
 
 @pytest.mark.parametrize("told", [False, True])
 def test_scenes_have_their_effects_in_them(told):
-    """Springs, dampers, rotors, and a motion that one coordinate is told: against differences of the scene's own evaluation."""
+    """Springs, dampers, rotors, and a prescribed coordinate: against differences of the scene's own evaluation."""
     model = linkages.five_bar()
     scene = pc.Scene(model).add(E.Gravity((0, -9.81, 0)), E.Spring(3.0), E.Damping(0.2), E.RotorInertia(0.1, hinges="inner1"), E.Loop())
     state = model.assemble(model.q, [0.3, 0.1, -0.2, 0.4], fix=["inner0"])

@@ -207,7 +207,7 @@ MOTIONS = {
 
 @pytest.mark.parametrize("name", MOTIONS)
 def test_both_methods_lead_to_one_motion(name):
-    """States, accelerations at them and what the loops put on coordinates; multipliers where none hangs on others."""
+    """States, accelerations at them and what the loops put on coordinates; multipliers where none depends on others."""
     make, T = MOTIONS[name]
     scenes = [make(method) for method in METHODS]
     runs = [scene.simulate(T, integrator="dop853", rtol=1e-11, atol=1e-12, progress=False) for scene in scenes]

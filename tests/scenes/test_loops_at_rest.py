@@ -22,7 +22,7 @@ def check_balanced(model, found, forces):
 
 
 def tree_forces(model, effects, q):
-    """What effects give at rest, the loops left out."""
+    """Return the forces of effects at rest, without the loops'."""
     said = pc.Scene(model).add(*effects).evaluate(q)
     return sum(said.forces.values())
 

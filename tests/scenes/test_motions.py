@@ -57,7 +57,7 @@ def test_an_oscillator_damped_and_driven():
 
 
 def test_a_block_that_slides_down_a_slope():
-    """Dry friction of μ m g cos θ, smoothed at 1e-4 m/s: the terminal acceleration, but for the start."""
+    """Dry friction of μ m g cos θ, smoothed at 1e-4 m/s: the terminal acceleration, except at the start."""
     theta, mu, g = 0.6, 0.3, 9.81
     model = slider(2.0, (np.cos(theta), 0, -np.sin(theta)))
     friction = mu * 2.0 * g * np.cos(theta)
@@ -178,7 +178,7 @@ def test_motions_of_every_sort():
 
 @pytest.mark.parametrize("kind", ["ball", "free"])
 def test_a_hinge_of_several_coordinates_follows_a_curve(kind):
-    """A quaternion of any length, and a position: the velocities are those of the body, by differences of its poses."""
+    """A quaternion of any length, and a position: the velocities are the body's, by differences of its poses."""
     model = pc.tree([-1, 0], [kind, "pin"], seed=2)
 
     def curve(t):
@@ -209,7 +209,7 @@ def test_a_hinge_of_several_coordinates_follows_a_curve(kind):
 
 
 def test_a_sampled_controller_is_called_at_its_times_and_holds():
-    """The forces between samples are those of the last one; the call sees the state at the sample; steps end there."""
+    """The forces between samples are held from the last one; the call sees the state at the sample; steps end there."""
     called = []
 
     def control(t, state):
@@ -285,7 +285,7 @@ def test_the_order_of_semi_implicit_steps():
 
 
 def test_an_implicit_run_leaves_no_step_behind():
-    """What follows it sees plain forces again."""
+    """Later effects see plain forces again."""
     arm = pc.chain(2)
     scene = pc.Scene(arm).add(E.ImplicitSpring(50.0))
     before = scene.evaluate([0.3, 0.2], [1.0, 2.0]).vdot

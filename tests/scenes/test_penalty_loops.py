@@ -58,7 +58,7 @@ def test_a_row_swings_at_its_frequency(ζ, omega):
 
 
 def test_rotors_and_what_is_prescribed_are_in_it():
-    """Compliance is of what moves: with a rotor on one wheel less, with one wheel driven that of the other alone."""
+    """Compliance is of what moves: less with a rotor on one wheel, and only the other wheel's with one wheel driven."""
     model = two_wheels()
     loop = E.Loop(method="penalty", frequency=30.0, damping_ratio=0.0)
 
@@ -272,7 +272,7 @@ def test_a_held_scene_is_a_tree_with_forces():
 
 
 def test_springs_are_of_the_present_state():
-    """Another q of the model is another compliance; of one scene that was run before, too."""
+    """Another q of the model is another compliance; also in a scene that was run before."""
     model = closed_four_bar()
     scene, off = held(model), model.integrate(model.q, [0.01, 0.0, 0.0])
     before = scene.evaluate(off, np.zeros(3)).forces["loop"]
@@ -304,15 +304,15 @@ def test_degenerate_models():
 @pytest.mark.parametrize(
     ("how", "says"),
     [
-        ({"method": "penalty"}, "takes frequency="),
+        ({"method": "penalty"}, "needs frequency="),
         ({"method": "penalty", "frequency": 0.0}, "positive and finite"),
         ({"method": "penalty", "frequency": -1.0}, "positive and finite"),
         ({"method": "penalty", "frequency": np.inf}, "positive and finite"),
         ({"method": "penalty", "frequency": 1e200}, "no finite number"),
         ({"method": "penalty", "frequency": 1.0, "damping_ratio": -0.1}, "damping_ratio is a finite number"),
-        ({"method": "penalty", "frequency": 1.0, "alpha": 1.0}, "alpha and beta are of method 'augment'"),
-        ({"frequency": 1.0}, "frequency and damping_ratio are of method 'penalty'"),
-        ({"method": "embed", "damping_ratio": 0.5}, "frequency and damping_ratio are of method 'penalty'"),
+        ({"method": "penalty", "frequency": 1.0, "alpha": 1.0}, "alpha and beta apply only to method 'augment'"),
+        ({"frequency": 1.0}, "frequency and damping_ratio apply only to method 'penalty'"),
+        ({"method": "embed", "damping_ratio": 0.5}, "frequency and damping_ratio apply only to method 'penalty'"),
         ({"method": "penalty", "frequency": "fast"}, "frequency"),
         ({"method": "penalty", "frequency": 1.0, "loops": "no"}, "no"),
         ({"method": "penalty", "frequency": 1.0, "loops": ["closure", "closure"]}, "named twice"),

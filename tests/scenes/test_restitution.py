@@ -13,7 +13,7 @@ FALL = np.sqrt(2 * 9.81)  # m/s, by 1 m
 @pytest.mark.parametrize("e", [1.0, 0.9, 0.5, 0.2])
 @pytest.mark.parametrize(("stiffness", "mass"), [(1e9, 1.0), (1e8, 3.0)])
 def test_balls(e, stiffness, mass):
-    """What falls by 1 m: gravity acts within the stop, too, by g/ωv of the speed."""
+    """A fall of 1 m: gravity also acts within the stop, by g/ωv of the speed."""
     ball = pc.Multibody("ball")
     ball.add_body("b", hinge="slider", axis=(0, 0, 1), mass=mass, limits=(0, np.inf))
     run = pc.Scene(ball).add(E.Gravity(), E.Limits(stiffness, restitution=(e, FALL))).simulate(1.0, [1.0], [0.0], **P)
@@ -59,8 +59,8 @@ def test_of_files_and_edits():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (dict(dissipation=1.0, restitution=(0.5, 1.0)), "in two ways; give one of them"),
-        (dict(restitution=0.5), r"a pair \(e, v\), a coefficient and the speed where it holds, not 0.5"),
+        (dict(dissipation=1.0, restitution=(0.5, 1.0)), "give either dissipation or restitution"),
+        (dict(restitution=0.5), r"a pair \(e, v\), a coefficient and the speed at which it holds, not 0.5"),
         (dict(restitution=(0.5,)), r"a pair \(e, v\)"),
         (dict(restitution=(0.0, 1.0)), "above 0 and no more than 1, not 0"),
         (dict(restitution=(1.1, 1.0)), "above 0 and no more than 1, not 1.1"),

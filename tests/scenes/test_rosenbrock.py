@@ -19,7 +19,7 @@ def stiff_pendulum(k=1e6, c=2e3):
 
 
 def test_stiff_motion_takes_few_steps():
-    """A hundredth of the steps that explicit methods need, for the same motion: that of one body, but for the spring's give."""
+    """A hundredth of the steps that explicit methods need, for the same motion of one body, except for the spring's deflection."""
     scene = stiff_pendulum()
     fast = scene.simulate(2.0, integrator="rosenbrock4", rtol=1e-6, atol=1e-9)
     slow = scene.simulate(0.2, integrator="dopri5", rtol=1e-6, atol=1e-9)

@@ -1,6 +1,6 @@
 """Scenes with rotors of unequal inertia on balls and of any on free hinges: integrators of both families, momentum, thermostats, effects.
 
-The equations are those of the kinetic energy ½ v*(ℳ + J)v, so that steps that come from its variation and steps that follow accelerations
+The equations follow from the kinetic energy ½ v*(ℳ + J)v, so that steps that come from its variation and steps that follow accelerations
 are of one motion, and exp(-H/kT) stays as it is.
 """
 
@@ -149,7 +149,7 @@ def test_langevin_keeps_the_canonical_distribution():
 
 
 def test_nose_hoover_keeps_its_energy():
-    """What the thermostat conserves, over a run with rotors that differ: to the integrator's error."""
+    """The thermostat's conserved quantity, over a run with unequal rotors: constant to the integrator's error."""
     model = ball()
     scene = pc.Scene(model).add(E.NoseHoover(1.0, 0.5))
     run = scene.simulate(5.0, model.zero_q(), [1.0, 0.15, -0.7], rtol=1e-11, atol=1e-12, **QUIET)

@@ -1,4 +1,4 @@
-"""What accuracy costs in a scene: integrators, arithmetic and effects against one reference, errors that are known."""
+"""Accuracy and cost in a scene: integrators, arithmetic and effects against one reference, errors that are known."""
 
 import re
 
@@ -54,7 +54,7 @@ def test_errors_are_those_of_the_integrators(table):
 
 
 def test_errors_are_those_of_the_effects(table, pendulum):
-    """Without an effect the error is that of the other motion, whatever the integrator; 10⁻⁵ N m is seen in its eighth figure."""
+    """Without an effect the error is the difference of the motions, for any integrator; 10⁻⁵ N m is seen in its eighth figure."""
     errors = {table.label(row): row["error"] for row in table}
     without = pc.Scene(pendulum.model).add(E.Gravity(), E.TorqueSource(1e-5))
     times = np.linspace(0, 2, 9)

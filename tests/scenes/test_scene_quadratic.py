@@ -124,7 +124,7 @@ def test_accelerations_against_differences_in_quad(model, name):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_every_entry_against_differences_of_first_derivatives(model, name):
-    """Along coordinates the mean of both orders, as exponential coordinates have it; rates of effects' own states, too."""
+    """Along coordinates the mean of both orders, as exponential coordinates have it; also rates of effects' own states."""
     scene, nv = pc.Scene(model).add(*EFFECTS[name]()), model.nv
     state, own, t = model.random_state(2), own_states(scene), 0.4
     n = 2 * nv + len(own)

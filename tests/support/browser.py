@@ -46,7 +46,7 @@ def opened(browser, address, *, dark=False, size=(1100, 700)):
 
 
 def pixels(page, selector="#figure"):
-    """What is seen of a part of the page, (height, width, 3)."""
+    """Return the picture of a part of the page, (height, width, 3)."""
     from matplotlib.image import imread
 
     return imread(io.BytesIO(page.locator(selector).screenshot()), format="png")[..., :3]

@@ -48,7 +48,7 @@ def lists_for_arrays(value):
 
 
 def alike(a, b):
-    """Whether two things hold the same numbers."""
+    """Check that two objects have the same values."""
     if isinstance(a, Mapping):
         return isinstance(b, Mapping) and set(a) == set(b) and all(alike(a[key], b[key]) for key in a)
     if isinstance(a, (list, tuple)):

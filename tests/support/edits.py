@@ -1,4 +1,4 @@
-"""Edits of a structure: hinges of every kind to be hung on, and edits that are refused."""
+"""Edits of a structure: hinges of every kind to move bodies to, and edits that are refused."""
 
 import pytest
 

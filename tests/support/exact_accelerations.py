@@ -78,5 +78,5 @@ def largest_error(got, exact):
 
 
 def floor(n, eps=EPS):
-    """What no correction takes away on a folded chain of n links."""
+    """Return the error that no correction removes on a folded chain of n links."""
     return 100 * eps * np.sqrt(n)

@@ -68,7 +68,7 @@ class FrameOracle:
         return self.body(self.number.get(name, -1), t, then)
 
     def _steps(self, k):
-        """Of each subhinge of body k its pose at the state, the placement before the first, and its rows."""
+        """Return the pose at the state and the rows of each subhinge of body k, with the placement before the first."""
         hinge, q, out = self.description["bodies"][k]["hinge"], self.q_of[k], []
         X = pose(**hinge["placement"])
         for subhinge in hinge["subhinges"]:

@@ -23,7 +23,7 @@ FUNCTIONS = {
 
 
 def values(graph, inputs):
-    """Of every node, at inputs {name: (B, n)}; constants are numbers. What no result reads need not be given."""
+    """Return the value of every node, at inputs {name: (B, n)}; constants are scalars. Inputs that no result reads may be omitted."""
     found = []
     with np.errstate(all="ignore"):
         for name, *taken in graph.operations:

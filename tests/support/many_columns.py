@@ -1,4 +1,4 @@
-"""Models whose operators are applied to many columns at once: those of the kernels of direct calls, and pins along coordinate axes."""
+"""Models whose operators are applied to many columns at once: models of the kernels of direct calls, and pins along coordinate axes."""
 
 import numpy as np
 
@@ -46,7 +46,7 @@ def inverse_of(model):
 
 
 def sweeps_of(model):
-    """What else is applied to many columns."""
+    """Further operators applied to many columns."""
     H, phi, psi, M, J = model.soa("H phi psi M J")
     MM = H @ phi @ M @ phi.T @ H.T
     return {"ℳ": MM, "ℳ + J": MM + J, "φ": phi, "φ*": phi.T, "ψ": psi, "ψ*": psi.T}

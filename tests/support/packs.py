@@ -20,18 +20,18 @@ def packs_from(states):
 
 
 def in_packs(ask):
-    """What a request gives in packs."""
+    """Return the result of a request in packs."""
     with packs_from(1):
         return np.asarray(ask(), float)
 
 
 def one_by_one(ask):
-    """What it gives state after state."""
+    """Return its result state after state."""
     with packs_from(NEVER):
         return np.asarray(ask(), float)
 
 
 def packed(bound, request="apply"):
-    """What the last run of a bound expression did in packs, as text; empty where it did nothing so."""
+    """Return the part that the last run of a bound expression executed in packs, as text; empty if there was none."""
     notes = [note for note in bound.plan(request).run_notes if note.startswith("packs:")]
     return notes[0] if notes else ""

@@ -10,7 +10,7 @@ CALLS = {name: arrays for name, (arrays, _) in _core.direct_calls().items() if n
 
 
 def warm(model):
-    """The first call goes by the method; what it makes is kept on the model."""
+    """The first call uses the method; its result is cached on the model."""
     model.mass_matrix()
     return model
 

@@ -12,7 +12,7 @@ from pycraft.proofs.words import add_to, split
 
 J0, CHAIN, SINGLE, CONSTANT = "J = 0", "serial chain", "single-DOF hinges", "constant H"
 ROUNDING = 1e-11
-"""What a step's two sides may differ by: a few hundred roundings, amplified by the sweep of P."""
+"""Allowed difference of a step's two sides: a few hundred roundings, amplified by the sweep of P."""
 
 
 def tree(seed=1, rotor_inertia=True):
@@ -58,7 +58,7 @@ LETTERS = sorted({*SPACES, *(alphabet().star(x) for x in SPACES)})
 
 
 def equations(hypotheses):
-    """What may be applied: axioms, definitions, inverses, lemmas, and their transposes; Υ and vectors aside."""
+    """Rules that may be applied: axioms, definitions, inverses, lemmas, and their transposes; Υ and vectors aside."""
     facts = theory()
     chosen = [e for e in facts._equations.values() if e.kind != "hypothesis" or e.hypothesis in hypotheses] + facts.lemmas
     fit = [e for e in dict.fromkeys(chosen) if all(x in LETTERS for w in [*e.lhs, *e.rhs] for x in w)]

@@ -39,7 +39,7 @@ def saved_and_loaded(model, path, **options):
 
 
 def lost(model, path):
-    """What a model loses on its way through a TOML file: nothing, in a list."""
+    """Return the properties that a model loses in a TOML file: an empty list."""
     again = saved_and_loaded(model, path)
     beside = differences(model.left_aside, again.left_aside, "left aside") + differences(model.actuators, again.actuators, "actuators")
     return differences(model.description(), again.description()) + beside

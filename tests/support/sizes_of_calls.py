@@ -11,7 +11,7 @@ def roundings(o):
 
 
 def force_size(o, description, vdot):
-    """What the generalized forces are sums of: ‖Hφ‖ (‖M‖ (‖φ*H*θ̈‖ + ‖φ*a‖) + ‖b‖) + ‖Jθ̈‖, without the cancellation in a and b."""
+    """Size of the summands of generalized forces: ‖Hφ‖ (‖M‖ (‖φ*H*θ̈‖ + ‖φ*a‖) + ‖b‖) + ‖Jθ̈‖, without the cancellation in a and b."""
     V = norm(o.V)
     a = V * (norm(o.H.T @ o.v) + norm(o.v)) + norm(o.a_gravity) + norm(o.H_dot.T @ o.v)
     return norm(o.H @ o.phi) * (norm(o.M) * norm(o.phi) * (norm(o.H.T @ vdot) + a) + norm(o.M) * V**2) + norm(o.J @ vdot)

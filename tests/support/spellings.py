@@ -52,7 +52,7 @@ def nodes(o):
     return o.B(["node9", "node10"])
 
 
-# ℳ, or ℳ + J where the spelling says so: one kernel for all of them.
+# ℳ, or ℳ + J, depending on the spelling: one kernel for all of them.
 MASS_MATRIX = {
     "as typed": lambda o: o.H @ o.phi @ o.M @ o.phi.T @ o.H.T,
     "with stars": lambda o: o.H * o.phi * o.M * o.phi.T * o.H.T,

@@ -1,4 +1,4 @@
-"""What sweeps of the tests do: functions that other processes import."""
+"""Functions of the sweeps in tests, which other processes import."""
 
 import os
 import signal

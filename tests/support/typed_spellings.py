@@ -1,4 +1,4 @@
-"""What people type: every spelling beside the package's own. Unicode, ASCII, LaTeX as written by hand and as printed by other tools."""
+"""Spellings that people type, besides the package's own. Unicode, ASCII, LaTeX as written by hand and as printed by other tools."""
 
 from support.typed_letters import LETTERS
 

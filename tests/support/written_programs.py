@@ -40,7 +40,7 @@ def run(algorithm, *arguments, **state):
 
 
 def logdet_bound(formula):
-    """What rounding moves ln|det| by (formulas.Formula.assert_logdet)."""
+    """Return the effect of rounding on ln|det| (formulas.Formula.assert_logdet)."""
     n, inverse = len(formula.value), norm(np.linalg.inv(formula.value)) if len(formula.value) else 0.0
     return SLACK * inverse * (formula.error + n * EPS * norm(formula.value)) * np.sqrt(max(n, 1)) + n * EPS
 

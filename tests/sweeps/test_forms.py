@@ -55,7 +55,7 @@ def in_digits(multibody):
 
 
 def assert_forms(soa, o, exact, form, precision, q=None):
-    """What derives from P, in one form and precision, against the oracle `exact`: within the bound from `o` in that epsilon."""
+    """Quantities derived from P, in one form and precision, against the oracle `exact`: within the bound from `o` in that epsilon."""
     letters, scale = Letters(soa, o), epsilon(precision) / EPS
     made = {name: getattr(letters, name) for name in RICCATI}
     made["mass_matrix_inverse"] = (letters.MM + letters.J).inv() if o.J.any() else letters.MM.inv()
@@ -185,7 +185,7 @@ def test_semidefinite_blocks(form):
 
 @pytest.mark.parametrize("form", ["ud", "square-root"])
 def test_indefinite_blocks_are_no_wrong_numbers(form):
-    """`fast` takes any symmetric M that leaves D regular; a form that needs factors of M says so where there are none."""
+    """`fast` takes any symmetric M that leaves D regular; a form that needs factors of M raises if there are none."""
     rng = np.random.default_rng(0)
     E, H = [None, rng.normal(size=(3, 3))], [rng.normal(size=(n, 3)) for n in (1, 2)]
     blocks = [-1, 0], E, H, [np.diag([2, -0.5, 1]), np.diag([1, 2, -0.3])]

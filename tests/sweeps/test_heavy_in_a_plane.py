@@ -1,7 +1,7 @@
-"""Heavy loads on pins about one axis: `ud` and `square-root` keep their digits at every ratio, and nothing wider has to say so.
+"""Heavy loads on pins about one axis: `ud` and `square-root` keep their digits at every ratio, without a wider precision.
 
 Three pins let a load go in their plane; across it nothing does. So all of it is felt across the plane, next to a light link in it, and what
-mixes the two costs digits by the ratio of masses. The bound is that of the hard cases, 100 eps √N: some hundred roundings, whose sum grows
+mixes the two costs digits by the ratio of masses. The bound is as in the hard cases, 100 eps √N: some hundred roundings, whose sum grows
 with the root of their number. That no wider residual is formed is asked of the kernels (cpp/tests/test_factored_kernels.cpp) and timed by
 `pycraft bench`.
 """
@@ -106,7 +106,7 @@ def test_what_mixes_the_plane_with_what_lies_across_keeps_six_digits(ratio, what
 
 
 def test_one_refinement_that_finds_nothing_but_rounding_changes_no_bit():
-    """What may be rounding is left out by the kernels themselves, as the report of the general recursions does."""
+    """The kernels drop corrections that may be rounding, as the report of the general recursions does."""
     arm = rods(1e3)
     for seed in range(6):
         state, tau = arm.random_state(seed), np.random.default_rng(seed).normal(size=arm.nv)

@@ -106,7 +106,7 @@ def test_expressions_have_the_digits_of_their_precision(case):
 
 @each_precision
 def test_products_with_arrays(case, precision):
-    """What comes out as a double is the wider number rounded once."""
+    """The double that is returned is the wider number rounded once."""
     multibody, letters, exact = case
     made = formulas(letters)
     with mpmath.workdps(DIGITS):
@@ -176,7 +176,7 @@ def test_batches(precision):
                           [inverse.at(q, precision=precision) @ t for q, t in zip(Q, tau, strict=True)])  # fmt: skip
     whole = multibody.forward_dynamics(Q, V, tau, precision=precision)
     single = [multibody.forward_dynamics(q, v, t, precision=precision) for q, v, t in zip(Q, V, tau, strict=True)]
-    # packs may round in another order; what is wider than a double is rounded to the same one but for a rare tie
+    # packs may round in another order; what is wider than a double is rounded to the same one, except for a rare tie
     assert np.abs(whole - single).max() <= 1e4 * max(epsilon(precision), 1e-4 * EPS) * (1 + np.abs(single).max())
 
 

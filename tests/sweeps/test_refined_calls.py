@@ -1,4 +1,4 @@
-"""What is refined: solves with operators, realizations, batches, every precision; and what is not.
+"""Requests that are refined: solves with operators, realizations, batches, every precision; and requests that are not.
 
 Errors and floors as in test_refinement.
 """

@@ -190,7 +190,7 @@ def test_quad_refined_once_has_the_digits_of_quad():
 
 
 def test_the_correction_is_the_error(case):
-    """The first correction is the unrefined error, to the share that it leaves; the last one bounds the error of the value but for
+    """The first correction is the unrefined error, to the share that it leaves; the last one bounds the error of the value up to
     rounding."""
     name, multibody, draws = case
     for draw, exact in draws:
@@ -228,7 +228,7 @@ def test_automatic_refinement_stops_when_corrections_no_longer_shrink(case):
         found = multibody.refinement(*draw, refine="auto")
         steps, corrections = found["steps"], found["corrections"]
         assert 1 <= steps == len(corrections) <= 8
-        assert all(after < before for before, after in zip(corrections[:-2], corrections[1:-1], strict=True))  # but for the last
+        assert all(after < before for before, after in zip(corrections[:-2], corrections[1:-1], strict=True))  # except the last
         assert corrections[-1] <= floor(multibody.nv) and relative_error(found["value"], exact) <= floor(multibody.nv)
 
 

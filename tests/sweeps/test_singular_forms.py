@@ -144,7 +144,7 @@ def two_carriages(inner, outer, T):
 @pytest.mark.parametrize("axis", [(1, 0, 0), SKEW], ids=["along x", "askew"])
 @pytest.mark.parametrize(("inner", "outer"), [(1e-3, 1e9), (1e-3, 1e16), (1.0, 1e18), (1e-9, 1e9)])
 def test_a_light_carriage_under_a_heavy_one(inner, outer, axis):
-    """What is left of D is the light mass; factors have it, differences only above their rounding. Of G factors have a digit askew as
+    """The remainder of D is the light mass; factors have it, differences only above their rounding. Of G factors have a digit askew as
     long as the ratio is above eps, and D is not enough: what falls with its base would have none."""
     arm = sliders(inner, outer, axis)
     T = np.array([3.0, -2.0])
@@ -228,7 +228,7 @@ def test_heavy_tips(form, ratio):
 
 
 def test_a_wider_precision_solves_what_a_form_must_refuse():
-    """The message says so, and it is so: `fast` in quad at a ratio of 1e19."""
+    """The message states it, and it is true: `fast` in quad at a ratio of 1e19."""
     arm = sliders(1e-3, 1e16, SKEW)
     T = np.array([3.0, -2.0])
     with pytest.raises(pc.SingularHingeError) as error:
@@ -244,7 +244,7 @@ def rod_inertia(axis, mass, share):
 
 
 def right_or_refused(arm, q, tau, form):
-    """Whether there is an answer; it has at least the first digit right."""
+    """Check that there is a result; it has at least one correct digit."""
     try:
         got = arm.forward_dynamics(q, np.zeros(arm.nv), tau, form=form)
     except pc.SingularHingeError:
@@ -313,7 +313,7 @@ def test_hinges_that_nearly_undo_each_other(seeds, form):
 
 
 def test_what_leaves_the_range_of_its_numbers_is_no_result():
-    """Overflow raises and says so, in every form, method and batch; no hinge is blamed for it."""
+    """Overflow raises an error that names it, in every form, method and batch; no hinge is blamed for it."""
     arm = pc.Multibody("rotor on an arm")
     arm.add_body("arm", None, "pin", mass=1.0, axis=(0, 0, 1), com=(0.5, 0, 0), inertia=np.eye(3))
     rotor = dict(mass=1.0, com=(0.3, 0.1, 0.2), inertia=np.diag([1.0, 2.0, 2.5]))

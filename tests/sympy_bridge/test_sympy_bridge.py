@@ -221,7 +221,7 @@ def test_text_with_names_scalars_and_refusals(arm):
     assert float(parse("logdet(D)", arm)) == float(arm.soa.D.logdet())
     with pytest.raises(ParseError, match="is an equation; parse takes one expression"):
         parse("phi == psi", arm)
-    with pytest.raises(ParseError, match="no operator is called 'Q'"):
+    with pytest.raises(ParseError, match="Q is a letter of models with loops"):
         parse("Q @ phi", arm)
     with pytest.raises(pc.ModelError):
         parse("phi", None)

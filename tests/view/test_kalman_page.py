@@ -29,7 +29,7 @@ def page():
 
 
 def told(page):
-    """What the page's script is given."""
+    """Return the data of the page's script."""
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.html, re.S).group(1))
 
 
@@ -106,7 +106,7 @@ def test_all_of_several_measurements_are_told():
     assert page.filter_steps[1].value.shape == (2, 2)
     data, f, s = told(page), page.track.filter(), page.track.smooth()
     assert data["measured"] == [[1, 2, None, 4], [8, None, 6, 5]]
-    np.testing.assert_allclose(data["predicted"], [[1, 0], [1, 2]] @ f.predicted.T, rtol=1e-5, atol=1e-9)  # six digits are told
+    np.testing.assert_allclose(data["predicted"], [[1, 0], [1, 2]] @ f.predicted.T, rtol=1e-5, atol=1e-9)  # the page has six digits
     np.testing.assert_allclose(data["smoothed"], [[1, 0], [1, 2]] @ s.states.T, rtol=1e-5)
     np.testing.assert_allclose(np.array(data["deviation"], float) ** 2, f.innovation_covariance[:, [0, 1], [0, 1]].T, rtol=1e-4)
 
@@ -124,17 +124,17 @@ def test_the_drawn_row_is_chosen(browser, page, tmp_path):
 
 
 def test_refusals():
-    with pytest.raises(pc.EvaluationError, match="61 time steps: 60 at most"):
+    with pytest.raises(pc.EvaluationError, match="61 time steps: at most 60"):
         track(61).play(np.ones(61))
     with pytest.raises(pc.ModelError, match="no measurements"):
         track().play()
-    with pytest.raises(pc.ModelError, match="no serial chain of 6 bodies"):
+    with pytest.raises(pc.ModelError, match="not a serial chain of 6 bodies"):
         track().play(np.ones(6), pc.chain(5))
-    with pytest.raises(pc.ModelError, match="no serial chain of 6 bodies"):
+    with pytest.raises(pc.ModelError, match="not a serial chain of 6 bodies"):
         track().play(np.ones(6), pc.tree([-1, 0, 0, 1, 1, 2], ["pin"] * 6))
-    with pytest.raises(pc.ModelError, match="a Multibody, not 'arm'"):
+    with pytest.raises(pc.ModelError, match="must be a Multibody, not 'arm'"):
         track().play(np.ones(6), "arm")
-    with pytest.raises(pc.ModelError, match=r"one number a coordinate.*\(6,\)"):
+    with pytest.raises(pc.ModelError, match=r"one value per coordinate.*\(6,\)"):
         track().play(np.ones(6), tau=[1.0])
     with pytest.raises(pc.SingularHingeError, match="step 1"):
         pc.kalman(1.0, 1.0, 1.0, 0.0, 0.0, P0=1.0, measurements=[1.0, 2.0]).play()

@@ -53,11 +53,11 @@ def test_squares_that_have_room_show_their_number():
 def test_what_cannot_be_linked_is_refused(tmp_path):
     with pytest.raises(pc.EvaluationError, match="'robot'.*'tree'"):
         TREE.soa.phi.blocks().on_robot("moon")
-    with pytest.raises(pc.EvaluationError, match="is of no model"):
+    with pytest.raises(pc.EvaluationError, match="has no model"):
         pc.constant([[1.0]], pc.euclidean(1), pc.euclidean(1), "C").blocks().on_robot()
-    with pytest.raises(pc.EvaluationError, match="no body, hinge or node"):
+    with pytest.raises(pc.EvaluationError, match="not a body, hinge or node"):
         TREE.soa.velocity.blocks().on_robot()
-    with pytest.raises(pc.EvaluationError, match=r"61 × 61 blocks: 60 a row at most"):
+    with pytest.raises(pc.EvaluationError, match=r"61 × 61 blocks: at most 60 per row"):
         pc.chain(61).soa.MM.blocks().on_robot()
     with pytest.raises(pc.EvaluationError, match="ends in .html"):
         TREE.soa.phi.blocks().on_robot().save(tmp_path / "blocks.png")
@@ -65,7 +65,7 @@ def test_what_cannot_be_linked_is_refused(tmp_path):
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_pointing_at_a_block_lights_its_path(browser, tmp_path, dark):
-    target = TREE.soa.MM.inv().blocks().on_robot("tree").save(tmp_path / "blocks.html")  # between siblings, too
+    target = TREE.soa.MM.inv().blocks().on_robot("tree").save(tmp_path / "blocks.html")  # also between siblings
     parents = list(TREE.soa._source.parents)
     leaves = [k for k in range(4) if k not in parents]
     with opened(browser, target.as_uri(), dark=dark) as page:

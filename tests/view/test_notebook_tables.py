@@ -1,5 +1,5 @@
-"""What tables look like in JupyterLab, whose own style sheet sets every table: here with its rules, and without style elements and scripts,
-which notebooks that are not trusted lose."""
+"""Appearance of tables in JupyterLab, which applies its own style sheet to every table: here with its rules, and without style elements and
+scripts, which are removed from notebooks that are not trusted."""
 
 import re
 
@@ -44,7 +44,7 @@ def test_theorems_are_on_the_left_and_numbers_in_one_piece(browser, report, trus
         assert page.evaluate(ALIGNED, "td:nth-child(-n+2)") == ["left"] and page.evaluate(ALIGNED, "td:nth-child(n+3)") == ["right"]
         assert page.evaluate(LINES, "td:nth-child(n+3)") == 1
         widths = [page.locator("tr:has(td)").nth(4).locator("td").nth(i).bounding_box()["width"] for i in range(4)]
-        assert widths[1] > 2 * max(widths[0], *widths[2:])  # formulas have the room, not a quarter each
+        assert widths[1] > 2 * max(widths[0], *widths[2:])  # formulas get most of the width, not a quarter
 
 
 def test_tidy_tables_keep_numbers_in_one_piece(browser, tmp_path):

@@ -52,7 +52,7 @@ def test_passes_of_eliminations_and_of_the_whole():
 @pytest.mark.parametrize("model", [pc.Multibody("nothing"), pc.chain(1), pc.tree([-1, -1], ["weld", "weld"], seed=1), pc.chain(MOST + 1)])
 def test_small_and_large(model):
     page = model.soa.MM.explain()._repr_html_()
-    assert ("more than are drawn" in page) == (len(model.bodies) > MOST) and "nan" not in page
+    assert ("too many to draw" in page) == (len(model.bodies) > MOST) and "nan" not in page
 
 
 @pytest.mark.parametrize("request_", ["dense", "diagonal", "trace", "logdet"])

@@ -54,7 +54,7 @@ def test_what_is_alone_has_all_of_its_directions():
     light = pc.Multibody("light on heavy")
     light.add_body("heavy", hinge="slider", axis=(1, 0, 0), mass=1e9, inertia=np.eye(3))
     light.add_body("light", parent="heavy", hinge="slider", axis=(1, 0, 0), mass=1.0, inertia=np.eye(3))
-    # Together they are the number of coordinates; the light one moves as if the other stood still, but for the ratio of masses, 1e-9.
+    # Together they are the number of coordinates; the light one moves as if the other were at rest, up to the ratio of masses, 1e-9.
     assert light.dof_shares().values == pytest.approx([1, 1], abs=1e-8)
 
 
@@ -87,7 +87,7 @@ def test_the_table_tells_the_largest_of_many():
     lines = repr(pc.chain(40, seed=1).dof_shares()).split("\n")
     numbers = [float(line.split()[1]) for line in lines[1:-2]]
     assert len(numbers) == 24 and numbers == sorted(numbers, reverse=True)
-    assert lines[-2:] == ["  and 16 more, with less each", "  together 40 of N = 40"]
+    assert lines[-2:] == ["  and 16 more with smaller shares", "  together 40 of N = 40"]
     assert max(map(len, lines)) <= 80
 
 
@@ -122,7 +122,7 @@ def test_matplotlibs_figure_follows_a_state():
         assert sorted(colours) == sorted(shade(x, 0, max(shares.values)) for x in shares.values)
         figure.update(model.random_state(1).q)
         assert figure._painted.artist in figure.artists
-        with pytest.raises(pc.EvaluationError, match=r"one a body of .*\(2,\)"):
+        with pytest.raises(pc.EvaluationError, match=r"one value per body of .*\(2,\)"):
             figure.paint([1.0], "share")
         pyplot.close("all")
 
@@ -145,7 +145,7 @@ def test_values_are_of_the_state_that_is_given():
 
 def test_pictures_of_many_bodies_are_tables():
     many = pc.chain(301).dof_shares()
-    assert many._repr_html_().startswith("<pre>") and "more, with less each" in many._repr_html_()
+    assert many._repr_html_().startswith("<pre>") and "more with smaller shares" in many._repr_html_()
 
 
 def test_shares_are_of_the_model_as_it_was():

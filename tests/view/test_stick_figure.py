@@ -43,7 +43,7 @@ def shown_columns(part):
 
 
 def all_in_view(figure):
-    """Whether whatever is drawn is within the limits of the axes."""
+    """Check that everything drawn is within the limits of the axes."""
     ax = figure.ax
     names = "xyz" if ax.name == "3d" else "xy"
     low, high = np.array([getattr(ax, f"get_{name}lim")() for name in names]).T
@@ -108,7 +108,7 @@ def test_every_line_ends_on_what_it_joins():
             reached += [bone[1] for bone in bones for a, b in slides if np.linalg.norm([*(bone[1] - a), *(b - joints[k])]) < 1e-12]
             assert reached, kind
     starts = np.array([np.linalg.norm(bones[:, 0] - joint, axis=1).min() for joint in joints])
-    assert starts.max() < 1e-12  # every body has a bone, one that carries a body on a free hinge alone, too
+    assert starts.max() < 1e-12  # every body has a bone, also one that carries only a body on a free hinge
 
 
 def test_markers_are_at_the_hinges_of_their_kind():

@@ -1,4 +1,4 @@
-"""What code shows in the viewer: places are those that were given, names replace, and what cannot be shown is refused."""
+"""Objects that code shows in the viewer: places are as given, names replace, and invalid objects are refused."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_names_replace_and_are_removed(view):
     edits = view.session.setup()["edits"]
     view.label("a", (0, 0, 0)).label("other text", (1, 1, 1), name="a")
     assert view.shown() == ["a"] and told(view, "a")["text"] == "other text" and view.session.setup()["edits"] == edits + 2
-    with pytest.raises(pc.ModelError, match="nothing called 'b' is shown; there are 'a'"):
+    with pytest.raises(pc.ModelError, match="no drawing is called 'b'; shown: 'a'"):
         view.remove("b")
     assert view.remove("a").shown() == []
     assert view.label("a", (0, 0, 0)).clear().shown() == []
@@ -62,18 +62,18 @@ def test_shapes_are_triangles(view, kind, size):
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda v: v.frame("f", np.ones((4, 4))), "a pose is .4, 4. with a rotation"),
-        (lambda v: v.frame("f", [1, 2]), "a pose is"),
-        (lambda v: v.frame("f", [1, 2, np.nan]), "of finite numbers"),
+        (lambda v: v.frame("f", np.ones((4, 4))), "a pose must be a finite array .4, 4. with a rotation"),
+        (lambda v: v.frame("f", [1, 2]), "a pose must be"),
+        (lambda v: v.frame("f", [1, 2, np.nan]), "must be a finite array"),
         (lambda v: v.frame("f", (0, 0, 0), on="moon"), "no body or node 'moon'"),
-        (lambda v: v.frame("f", (0, 0, 0), size=-1), "size is a length above zero"),
+        (lambda v: v.frame("f", (0, 0, 0), size=-1), "size must be a positive length in m"),
         (lambda v: v.frame(7, (0, 0, 0)), "named by a string"),
-        (lambda v: v.label("t", (0, 0)), r"at takes finite numbers, \(3,\)"),
-        (lambda v: v.line("l", [1, 2, 3]), r"points takes finite numbers, \(n, 3\)"),
-        (lambda v: v.label("t", (0, 0, 0), colour="red"), "colour is '#rrggbb'"),
-        (lambda v: v.shape("s", "cone", 1), "no shape 'cone'; there are box"),
-        (lambda v: v.shape("s", "box", 1), "the size of a box is lengths of its edges: 3 numbers"),
-        (lambda v: v.shape("s", "sphere", -1), "numbers above zero"),
+        (lambda v: v.label("t", (0, 0)), r"at takes finite values in m of shape \(3,\)"),
+        (lambda v: v.line("l", [1, 2, 3]), r"points takes finite values in m of shape \(n, 3\)"),
+        (lambda v: v.label("t", (0, 0, 0), colour="red"), "colour must be '#rrggbb'"),
+        (lambda v: v.shape("s", "cone", 1), "unknown shape 'cone'; choose from box"),
+        (lambda v: v.shape("s", "box", 1), "the size of a box is lengths of its edges: 3 positive values"),
+        (lambda v: v.shape("s", "sphere", -1), "positive values"),
         (lambda v: v.shape("s", "mesh", (1, 1, 1), file="nowhere.stl"), "nowhere.stl"),
     ],
 )

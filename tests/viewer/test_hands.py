@@ -132,8 +132,8 @@ def test_loops_stay_closed_when_a_body_is_led(session):
     "given, words",
     [
         (dict(body="moon", place=[0, 0, 0], to=[0, 0, 0]), "has no body 'moon'"),
-        (dict(body="lower", place=[0, 0], to=[0, 0, 0]), "place: three finite numbers"),
-        (dict(body="lower", place=[0, 0, 0], to=[0, 0, np.inf]), "to: three finite numbers"),
+        (dict(body="lower", place=[0, 0], to=[0, 0, 0]), "place must be three finite numbers"),
+        (dict(body="lower", place=[0, 0, 0], to=[0, 0, np.inf]), "to must be three finite numbers"),
         (dict(body="lower"), "missing 2 required"),
     ],
 )

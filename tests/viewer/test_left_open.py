@@ -57,7 +57,7 @@ def test_a_page_left_open_does_not_grow(browser):
 
 
 def test_the_server_does_not_grow():
-    """What a page asks for and does, over HTTP and without a browser in this process: a round leaves nothing behind."""
+    """Send the requests and actions of a page, over HTTP and without a browser in this process: a round leaves nothing behind."""
     scene = pc.mechanisms.double_pendulum().add(pc.effects.Damping(0.01))
     with scene.view(q=[1.0, 2.0]) as view:
         address = urlsplit(view.address)

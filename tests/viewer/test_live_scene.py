@@ -283,16 +283,16 @@ def test_refusals(session):
     scene = pc.mechanisms.double_pendulum().add(pc.effects.Damping(0.1))
     one = session(scene)
     for action, given, words in (
-        ("jump", {}, "no action 'jump'; there are play"),
+        ("jump", {}, "no action 'jump'; choose from play"),
         ("move", {"coordinate": 7, "to": 0.0}, "coordinate 7"),
         ("move", {"coordinate": 0, "to": float("inf")}, "finite"),
         ("move", {"coordinate": 0}, "move: "),
         ("scale", {"to": 0}, "scale=0"),
         ("effect", {"name": "wind", "on": False}, "no effect 'wind'"),
-        ("parameter", {"effect": "damping", "field": "hinges", "value": 1.0}, "no number 'hinges'"),
+        ("parameter", {"effect": "damping", "field": "hinges", "value": 1.0}, "no numeric parameter 'hinges'"),
         ("parameter", {"effect": "damping", "field": "coefficient", "value": [1.0, 2.0]}, "shape"),
         ("parameter", {"effect": "damping", "field": "coefficient", "value": float("nan")}, "finite"),
-        ("ghost", {"name": "of Banquo"}, "no ghost 'of Banquo'"),
+        ("ghost", {"name": "of Banquo"}, "no ghost is called 'of Banquo'"),
     ):
         before = one.live.q.copy(), scene.effects["damping"].coefficient
         with pytest.raises((pc.ModelError, pc.EvaluationError), match=words):
@@ -301,7 +301,7 @@ def test_refusals(session):
         assert scene.effects["damping"].coefficient == before[1]
     with pytest.raises(pc.ModelError, match="no body 'hand'"):
         one.body("hand")
-    with pytest.raises(pc.EvaluationError, match="no blocks of 'Z'"):
+    with pytest.raises(pc.EvaluationError, match="blocks of 'Z' are not shown"):
         one.blocks("Z")
 
 

@@ -441,7 +441,7 @@ def test_what_is_seen_is_saved(browser, view, tmp_path):
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_a_phone_has_one_column(browser, dark):
-    """What plays stands below the figure, nothing lies over anything, nothing is wider than the screen."""
+    """The controls of playback are below the figure, nothing overlaps, nothing is wider than the screen."""
     with pc.robots.panda().view() as view, opened(browser, view.address, size=(390, 844), dark=dark) as page:
         ready(page)
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
@@ -494,7 +494,7 @@ def test_code_turns_the_camera(browser):
         with shown_page(browser, view) as another:
             ready(another)
             assert another.evaluate("[figure.zoom, figure.follow]") == [2, "6"]
-        for wrong, words in ((("moon",), "there are 'from above'"), (("top", "moon"), "'robot', a body of 'panda'")):
+        for wrong, words in ((("moon",), "choose from 'from above'"), (("top", "moon"), "'robot', a body of 'panda'")):
             with pytest.raises(pc.Error, match=words):
                 view.look(*wrong)
         with pytest.raises(pc.EvaluationError, match="zoom=0"):

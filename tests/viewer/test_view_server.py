@@ -32,7 +32,7 @@ def asked(view, method, path, body=None, headers=None):
 
 def test_what_it_says(view):
     assert isinstance(view, View) and view.address.startswith("http://127.0.0.1:") and view.is_local
-    assert repr(view) == f"<view of 'double pendulum' at {view.address} (this machine alone)>"
+    assert repr(view) == f"<view of 'double pendulum' at {view.address} (this machine only)>"
     assert f'<iframe src="{view.address}"' in view._repr_html_()
     status, page, headers = asked(view, "GET", "/")
     assert (
@@ -87,7 +87,7 @@ def test_foreign_pages_are_refused(view, headers, method):
     given = {name: value.replace("PORT", str(port)) for name, value in headers.items()}
     path, body = ("/state", None) if method == "GET" else ("/do", '{"action": "random"}')
     status, told, sent = asked(view, method, path, body, given)
-    assert status == 403 and json.loads(told) == {"error": "this viewer answers its own page alone"}
+    assert status == 403 and json.loads(told) == {"error": "this viewer answers only its own page"}
     assert not any(name.lower().startswith("access-control") for name in sent)
     np.testing.assert_array_equal(view.session.live.q, before)
 
@@ -114,7 +114,7 @@ def test_other_paths(view):
 
 
 def test_other_machines_where_it_is_told_to():
-    with pytest.warns(UserWarning, match="other machines, too"), pc.chain(1).view(host="0.0.0.0") as shown:
+    with pytest.warns(UserWarning, match="open to other machines"), pc.chain(1).view(host="0.0.0.0") as shown:
         assert not shown.is_local and shown.address.startswith("http://localhost:")
         assert asked(shown, "GET", "/state", None, {"Host": f"robot.lab:{shown._server.server_address[1]}"})[0] == 200
         assert asked(shown, "GET", "/state", None, {"Origin": "http://evil.example"})[0] == 403
@@ -135,15 +135,15 @@ def test_refusals(view):
     model = pc.chain(1)
     taken = view._server.server_address[1]
     for options, words in (
-        ({"port": taken}, f"port {taken}: .*port=0 takes a free one"),
-        ({"port": 70000}, "port=70000: from 1 to 65535"),
-        ({"host": "256.0.0.1"}, "cannot be at 256.0.0.1"),
+        ({"port": taken}, f"port {taken}: .*port=0 picks a free port"),
+        ({"port": 70000}, "port=70000: give a port from 1 to 65535"),
+        ({"host": "256.0.0.1"}, "cannot use 256.0.0.1"),
     ):
         with pytest.raises(pc.EvaluationError, match=words):
             model.view(**options)
     with pytest.raises(pc.ModelError):
         model.view(q=[1.0, 2.0])
-    with pytest.raises(pc.ModelError, match="beside: a second scene, not 3"):
+    with pytest.raises(pc.ModelError, match="beside takes a second scene, not 3"):
         pc.Scene(model).view(beside=3)
 
 

@@ -44,7 +44,7 @@ def held(model):
 
 
 def same(a, b):
-    """Whether a copy is of what it was."""
+    """Check that a copy equals the original."""
     if isinstance(a, _core.Parameter):
         return a.name == b.name
     if isinstance(a, _core.Theorem):
@@ -78,7 +78,7 @@ def test_copies():
 
 
 def test_parameters_are_used_again():
-    """What a parameter does is pickled with it, not its name alone."""
+    """A parameter is pickled with its function, not only with its name."""
     model = every_kind()
     for name, thing in held(model).items():
         if isinstance(thing, _core.Parameter):

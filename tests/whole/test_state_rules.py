@@ -1,4 +1,4 @@
-"""Which state a call means: one rule for direct calls, expressions and certificates. Jacobians in other axes, against other frames."""
+"""The state of a call: one rule for direct calls, expressions and certificates. Jacobians in other axes, against other frames."""
 
 import inspect
 

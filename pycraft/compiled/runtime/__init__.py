@@ -1,1 +1,1 @@
-"""C++ that compiled source is made of: what stands before the lines of a graph, and the loop over states behind them."""
+"""C++ parts of compiled source: the code before the lines of a graph, and the loop over states after them."""

@@ -1,4 +1,4 @@
-"""Dense matrices, those without rows included."""
+"""Dense matrices, including matrices without rows."""
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def norm(A: np.ndarray) -> float:
 
 
 def square_root(x: float) -> float:
-    """√x; what rounding left below zero is zero."""
+    """√x; values that rounding made negative count as zero."""
     return float(np.sqrt(max(x, 0)))
 
 

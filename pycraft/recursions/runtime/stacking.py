@@ -1,10 +1,10 @@
-"""Vectors and blocks body by body, and what they are as a whole."""
+"""Vectors and blocks body by body, and as a whole."""
 
 import numpy as np
 
 
 def ranges(sizes: list[int]) -> list[np.ndarray]:
-    """The rows of each body where bodies follow each other."""
+    """The rows of each body when bodies are contiguous."""
     ends = np.cumsum(sizes).astype(int)
     return [np.arange(end - size, end) for end, size in zip(ends, sizes, strict=True)]
 
@@ -31,6 +31,6 @@ def assembled(B: list[np.ndarray], rows: list[np.ndarray], columns: list[np.ndar
 
 
 def blocks(given: list, rows: list[np.ndarray], columns: list[np.ndarray]) -> list:
-    """Blocks as arrays of their shapes; None where there is none."""
+    """Blocks as arrays of their shapes; None for a missing block."""
     shaped = zip(given, rows, columns, strict=True)
     return [None if b is None else np.asarray(b, float).reshape(len(r), len(c)) for b, r, c in shaped]

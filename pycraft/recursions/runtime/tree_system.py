@@ -6,9 +6,9 @@ from .matrices import inverse, logdet, solve
 
 
 class TreeSystem:
-    """T s = b, its unknowns the states of bodies, coupled to the parent p and the children c alone, and a border b, coupled to all.
+    """T s = b, with the states of bodies as unknowns, coupled only to the parent p and the children c, and a border b, coupled to all.
 
-    sizes[k] are the sizes of body k's states, border those of the border's (0 where a state is of the other kind).
+    sizes[k] are the sizes of body k's states, border the sizes of the border's states (0 for a state of the other kind).
     """
 
     def __init__(self, parent: list[int], sizes: list[list[int]], border: list[int]):
@@ -26,7 +26,7 @@ class TreeSystem:
         self.factored = False
         self.pivots = tuple([np.empty((0, 0))] * self.n for _ in range(4))  # A, U, X, Y
         self.S = self.T_corner
-        self.whole: np.ndarray | None = None  # T, where it is solved all at once
+        self.whole: np.ndarray | None = None  # T, if it is solved all at once
 
     def _rows(self, k: int, i: int) -> slice:
         return slice(self.start[k][i], self.start[k][i + 1])
@@ -59,7 +59,7 @@ class TreeSystem:
         return s[k][self._rows(k, j)]
 
     def factor(self) -> None:
-        """Eliminates from the leaves to the root; all at once where a pivot is singular, or nearly."""
+        """Eliminate from the leaves to the root; all at once if a pivot is singular, or nearly."""
         if self.factored:
             return
         self.factored = True
