@@ -8,14 +8,17 @@
 #   make docs                   the site, from these pages and the code; build/docs/html, which needs no network (extra [docs])
 #   make lab | bench            JupyterLab in notebooks; the bounds measured
 #   make performance            speed beside Pinocchio and MuJoCo (extra [peers]); writes docs/performance.md
-#   make test-address | test-undefined | test-thread   the C++ tests under a sanitizer (GCC's or Clang's)
+#   make test-address | test-undefined | test-thread   the C++ tests under a sanitizer (GCC's or Clang's); test-address under both of the first
+#   make campaign-address       a hundred thousand requests of random expressions under the same (GCC's; hours of one core; SEEDS=60 for a tenth)
 #   make test-clang             the C++ tests built by Clang (needs clang++: apt install clang, or CLANG=/path/to/clang++)
 #   make wheel                  dist/*.whl for other machines: libquadmath inside, the glibc it needs in its name (Linux)
 #   make mutants                small wrong changes, which the tests must notice; writes tests/mutation.md (under an hour)
 #   make campaigns              refinement against 5000 models made to break it, expressions of all letters against NumPy (half an hour of one core)
+#   make campaign-guarded       the expressions again, 600 seeds (SEEDS=...), with guards around the memory of the core (Linux; hours of one core)
 #   make stability              the catalogue of hard cases in full, beside the peers; writes tests/accuracy/stability.md
 PYTHON ?= python3
 MODEL ?=
+SEEDS ?= 600
 BIN := .venv/bin
 JOBS ?= $(shell nproc 2>/dev/null || sysctl -n hw.ncpu)
 PARALLEL := -n $(JOBS) --dist worksteal
@@ -25,7 +28,7 @@ SOURCES := $(shell find cpp pycraft -name '*.h' -o -name '*.cpp' -o -name '*.py'
 COMPILED := $(shell find cpp -name '*.h' -o -name '*.cpp' -o -name '*.in' -o -name '*.py') CMakeLists.txt pyproject.toml
 
 .PHONY: FORCE docs tour test test-cpp test-python test-peers test-browser check lab bench performance stability campaigns lint clean wheel mutants \
-        test-address test-undefined test-thread test-clang
+        test-address test-undefined test-thread test-clang campaign-address campaign-guarded
 
 tour: .venv/installed
 	$(BIN)/pycraft tour $(MODEL)
@@ -55,13 +58,28 @@ test-browser: .venv/browser
 	$(BIN)/python -m pytest -m browser
 
 # The C++ tests in build trees of their own. A sanitized test takes several times as long; -O1 keeps the build short.
-CPP_TESTS = $(BIN)/cmake -S . -B build/$@ -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python $(1) \
-	&& $(BIN)/cmake --build build/$@ --target cpp_tests -j $(JOBS) && $(BIN)/ctest --test-dir build/$@ --output-on-failure -j $(JOBS)
+CPP_TREE = $(BIN)/cmake -S . -B build/$(1) -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN))/ninja -DPython_EXECUTABLE=$(abspath $(BIN))/python $(2)
+CPP_TESTS = $(call CPP_TREE,$@,$(1)) && $(BIN)/cmake --build build/$@ --target cpp_tests -j $(JOBS) && $(BIN)/ctest --test-dir build/$@ --output-on-failure -j $(JOBS)
 SANITIZED = -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DPYCRAFT_SANITIZE=$(1)
+ADDRESS = $(call SANITIZED,address$(COMMA)undefined)
+COMMA := ,
 CLANG ?= clang++
 
 test-address: .venv/requirements
-	$(call CPP_TESTS,$(call SANITIZED,address))
+	$(call CPP_TESTS,$(ADDRESS))
+
+# The module of that tree in a copy of the package. -S: the editable install would hide it. A shared library that is sanitized needs the sanitizer
+# in the process before it, and the C++ library, whose exceptions it watches.
+SANITIZED_PACKAGE := build/test-address/package
+campaign-address: .venv/tested
+	$(call CPP_TREE,test-address,$(ADDRESS))
+	$(BIN)/cmake --build build/test-address --target _core -j $(JOBS)
+	rm -rf $(SANITIZED_PACKAGE) && mkdir -p $(SANITIZED_PACKAGE) && cp -R pycraft $(SANITIZED_PACKAGE)/pycraft
+	$(BIN)/cmake --install build/test-address --component python --prefix $(SANITIZED_PACKAGE)/pycraft
+	site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))') \
+	preload="$$($(CXX) -print-file-name=libasan.so) $$($(CXX) -print-file-name=libstdc++.so)"; \
+	env LD_PRELOAD="$$preload" ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONPATH=$(abspath $(SANITIZED_PACKAGE)):$$site \
+		$(BIN)/python -S tests/campaigns/expressions.py --seeds $(SEEDS) --jobs $(JOBS)
 
 test-undefined: .venv/requirements
 	$(call CPP_TESTS,$(call SANITIZED,undefined))
@@ -102,6 +120,11 @@ stability: .venv/peers
 campaigns: .venv/tested
 	$(BIN)/python tests/campaigns/refinement.py --seeds 5000 --jobs $(JOBS) --verbose
 	$(BIN)/python tests/campaigns/expressions.py --seeds 1000 --jobs $(JOBS)
+
+# The same expressions with guards at the ends of what the installed core allocates, in place of a sanitized build.
+campaign-guarded: .venv/tested
+	mkdir -p build && $(CXX) -std=c++20 -O2 -Wall -Wextra -shared -fPIC -o build/guarded_memory.so tests/campaigns/guarded_memory.cpp
+	env LD_PRELOAD=$(abspath build/guarded_memory.so) $(BIN)/python tests/campaigns/expressions.py --seeds $(SEEDS) --jobs $(JOBS)
 
 lint: .venv/tested
 	$(BIN)/ruff check pycraft tests cpp docs/making docs/gallery

@@ -75,6 +75,18 @@ def one_number(value: Any, what: str) -> float:
     return float(number)
 
 
+def first_not_finite(given: np.ndarray, axes: int = 1) -> tuple[tuple[int, ...], float, str] | None:
+    """Return the first entry that is not finite: its place within its state, its value, and " (state 1 of a batch of 3)" in a batch.
+
+    None where all are finite. `axes`: those of one state.
+    """
+    if np.isfinite(given).all():
+        return None
+    at = tuple(int(i) for i in np.argwhere(~np.isfinite(given))[0])
+    batch = given.ndim > axes and len(given) > 1
+    return at[given.ndim - axes :], float(given[at]), f" (state {at[0]} of a batch of {len(given)})" if batch else ""
+
+
 def moment(t: Any) -> float:
     """Return a time, s. EvaluationError if it is not finite."""
     number = one_number(t, "t")

@@ -7,6 +7,7 @@
 #include "dynamics/frame_cache.h"
 #include "dynamics/frame_calls.h"
 #include "model/checks.h"
+#include "runtime/of_state.h"
 
 namespace pycraft {
 
@@ -123,8 +124,10 @@ struct States {
     const Array a = numbers(time, "t");
     if (a.ndim() > 1) throw ModelError("t is a number, or one a state, not " + shape_text(a));
     t.assign(a.data(), a.data() + a.size());
-    for (const double x : t)
-      if (!std::isfinite(x)) throw ModelError("t has an entry that is not a finite number");
+    for (size_t b = 0; b < t.size(); ++b)
+      checking_state(static_cast<int>(b), static_cast<int>(t.size()), [&] {
+        if (!std::isfinite(t[b])) throw ModelError("t has an entry that is not a finite number");
+      });
     if (a.ndim() == 0) return;
     const int times = static_cast<int>(a.size());
     if (batch >= 0 && batch != times) throw ModelError("t has " + std::to_string(times) + " times for " + std::to_string(batch) + " states");

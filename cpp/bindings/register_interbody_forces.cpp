@@ -85,12 +85,14 @@ py::tuple along_a_run(SceneCalls& calls, const Array& t, const Array& q, const A
         const std::vector<S> wq(q.data() + size_t(i) * nq, q.data() + size_t(i + 1) * nq), wv(v.data() + size_t(i) * nv, v.data() + size_t(i + 1) * nv);
         const double* const of = own.size() > 0 ? own.data() + i * states : first.data();
         const std::vector<S> y(of, of + states);
-        scene_interbody_forces(scene, S(t.data()[i]), wq.data(), wv.data(), y.data(), vdot.data(), on);
-        for (int k = 0; k < N; ++k) {
-          write(reaction ? on.reaction(k) : on.forces()[k], to_f + (size_t(i) * N + k) * 6);
-          write(on.poses()[k], to_X + (size_t(i) * N + k) * 16);
-        }
-        require_finite(to_f + size_t(i) * N * 6, size_t(N) * 6, model);
+        naming_state(i, rows, [&] {
+          scene_interbody_forces(scene, S(t.data()[i]), wq.data(), wv.data(), y.data(), vdot.data(), on);
+          for (int k = 0; k < N; ++k) {
+            write(reaction ? on.reaction(k) : on.forces()[k], to_f + (size_t(i) * N + k) * 6);
+            write(on.poses()[k], to_X + (size_t(i) * N + k) * 16);
+          }
+          require_finite(to_f + size_t(i) * N * 6, size_t(N) * 6, model);
+        });
       }
     });
   }

@@ -36,7 +36,12 @@ struct PythonCoupling {
   void operator()(int n, const double* q, double* r, double* gradient, double* second, double* third) const {
     py::gil_scoped_acquire gil;
     const std::string what = "the function of coupling '" + coupling + "'";
-    const py::object given = of_user(what, [&] { return f(py::array_t<double>(n, q)); });
+    const auto place = [&] {
+      std::string at;
+      for (int i = 0; i < n; ++i) at += (i ? ", " : "") + short_number(q[i]);
+      return " at q = (" + at + ")";
+    };
+    const py::object given = of_user([&] { return what + place(); }, [&] { return f(py::array_t<double>(n, q)); });
     if (!py::isinstance<py::tuple>(given) || (py::len(given) != 3 && py::len(given) != 4))
       throw ModelError(what + " returns (r, gradient, second derivatives), of shapes (), (n,), (n, n), and third ones (n, n, n) if it has them; no difference is taken in their place");
     const py::tuple parts = given;
@@ -44,11 +49,17 @@ struct PythonCoupling {
       throw EvaluationError("coupling '" + coupling + "' is a function, which has no third derivatives, and they are asked for: of rows twice, or of what they ask where its "
                             "coordinates move; let it return them (n, n, n) as a fourth, or give polynomials");
     *r = one_number(parts[0], ("r of " + what).c_str());
-    if (!std::isfinite(*r)) throw ModelError("r of " + what + " is not a finite number");
     copy(parts[1], "the gradient of " + what, {n}, gradient);
     copy(parts[2], "the second derivatives of " + what, {n, n}, second);
-    check_symmetric(n, second, what);
     if (third) copy(parts[3], "the third derivatives of " + what, {n, n, n}, third);
+    const auto require_finite = [&](const char* part, const double* x, int size) {
+      for (int i = 0; i < size; ++i)
+        if (!std::isfinite(x[i])) throw EvaluationError(part + what + " has an entry that is " + short_number(x[i]) + place());
+    };
+    if (!std::isfinite(*r)) throw EvaluationError("r of " + what + " is " + short_number(*r) + place());
+    require_finite("the gradient of ", gradient, n), require_finite("the second derivatives of ", second, n * n);
+    if (third) require_finite("the third derivatives of ", third, n * n * n);
+    check_symmetric(n, second, what);
   }
 
  private:
@@ -66,10 +77,7 @@ struct PythonCoupling {
     const Array a = numbers(given, what.c_str());
     if (a.ndim() != static_cast<py::ssize_t>(shape.size()) || !std::equal(shape.begin(), shape.end(), a.shape()))
       throw ModelError(what + ": of " + std::to_string(shape[0]) + " coordinates it has that many numbers, or rows of them, not " + shape_text(a));
-    for (py::ssize_t i = 0; i < a.size(); ++i) {
-      if (!std::isfinite(a.data()[i])) throw ModelError(what + " has an entry that is not a finite number");
-      to[i] = a.data()[i];
-    }
+    std::copy_n(a.data(), a.size(), to);
   }
 };
 

@@ -29,9 +29,7 @@ void CallsOnLoops<Workspace>::run(const AskedOnLoops& asked, const ResultsOnLoop
   const Multibody& model = this->model();
   const ModelInUse use(model);
   check_given(model, {asked.q, asked.v, asked.input});
-  for (int b = 0; b < (asked.wrenches.batch < 0 ? 1 : asked.wrenches.batch); ++b)
-    for (int i = 0; i < asked.wrenches.width; ++i)
-      if (!std::isfinite(asked.wrenches.at(b)[i])) throw ModelError("the wrench on '" + asked.pushed->nodes[i / 6].name + "' has an entry that is not finite");
+  check_wrenches(asked.pushed, asked.wrenches);
   if (!std::isfinite(asked.alpha) || !std::isfinite(asked.beta) || asked.alpha < 0 || asked.beta < 0)
     throw ModelError("Baumgarte's alpha and beta are finite numbers, zero or more (1/s), not " + short_number(asked.alpha) + " and " + short_number(asked.beta));
   const auto loops = loops_->resolved();

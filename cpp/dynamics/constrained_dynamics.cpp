@@ -136,9 +136,31 @@ void ConstrainedWorkspace<S>::refuse_rows(const std::vector<S>& off, const S& wo
   throw EvaluationError(std::string(what) + " of '" + source_.name() + "': " + named);
 }
 
+// At a singular state rows depend on each other in any units. Rows that do in units of energy alone, as two that a light body shares with heavy ones,
+// are told apart by a wider scalar.
+template <class S>
+bool ConstrainedWorkspace<S>::apart_in_own_units() {
+  if constexpr (settles<S>) {
+    MinimumNormSystem<S> own;
+    for (size_t g = 0; g < systems_.size(); ++g) {
+      own.begin(model_->nv);
+      for (const int row : asking_[g]) {
+        const S size = size_of(row);
+        if (!(size > S(0))) continue;
+        own.add_column();
+        for (const auto& e : rows_.entries[row]) own.add_entry(e.coordinate, S(e.value / size), S(1));
+      }
+      const std::vector<S> ones(asking_[g].size(), S(1));
+      own.factor(ones.data(), rank_tolerance<S>());
+      if (own.rank() > systems_[g].rank()) return true;
+    }
+  }
+  return false;
+}
+
 // Of every group by itself. Where `first`, what the rows ask of one motion and cannot have together is refused.
 template <class S>
-void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
+bool ConstrainedWorkspace<S>::meet(const S* target, bool first) {
   using std::abs;
   const int nv = model_->nv;
   part_.assign(loops_->rows, S(0)), off_.assign(loops_->rows, S(0));
@@ -163,13 +185,16 @@ void ConstrainedWorkspace<S>::meet(const S* target, bool first) {
       worst = maximum(worst, off_[row]);
     }
   }
-  if (worst > S(0))
+  if (worst > S(0)) {
+    if (settles_rows_of<S>(*loops_) && apart_in_own_units()) return false;
     refuse_rows(off_, worst, "rows of loops hang together and ask for different accelerations of one motion, at a singular state, by functions that conflict, or, where masses are far apart, by rounding (take a wider precision),");
+  }
   delta_.assign(nv, S(0)), r_.assign(nv, S(0));
   rows_.add_transposed(part_.data(), r_.data());
   solve(r_.data(), delta_.data());
   for (int i = 0; i < nv; ++i) x_[i] += delta_[i];
   for (int r = 0; r < loops_->rows; ++r) lambda_[r] += part_[r];
+  return true;
 }
 
 // One step of refinement of both equations: r = T + Q*λ - (the forces of x), and what the rows are off by.
@@ -372,7 +397,7 @@ void ConstrainedWorkspace<S>::accelerate(const std::shared_ptr<const ResolvedLoo
       stand_for(wider.rank(), systems_);
     }
   };
-  meet(c_.data(), true);  // what it refuses here a wider scalar might meet by noise alone
+  if (!meet(c_.data(), true)) return settle();
   const int steps = asked.refinement.steps == Refinement::automatic ? 5 : asked.refinement.steps;
   S last = S(0);
   for (int step = 0; step < steps; ++step) {

@@ -81,7 +81,9 @@ class ConstrainedWorkspace {
   void set_loops(const std::shared_ptr<const ResolvedLoops>& loops);
   void find_bias(const Asked& asked);         // Q̇θ̇ with gains and what drives the rows, and the size of what it is the sum of
   void factor(const S* bias);                 // the rows' columns, of the tree's factors; of accelerations with Q̇θ̇, else null
-  void meet(const S* target, bool first);     // x += (ℳ + J)⁻¹Q*λ such that Q x + target = 0, and adds λ
+  // x += (ℳ + J)⁻¹Q*λ such that Q x + target = 0, and adds λ. `first`: where rows conflict, false if a wider scalar may tell them apart, else refused.
+  bool meet(const S* target, bool first);
+  bool apart_in_own_units();                  // whether rows that depend on each other in units of energy are independent in their own
   void correct(const Asked& asked, const Applied<S>& applied);
   void add_correction();
   bool sure(const Asked& asked, const Applied<S>& applied, bool refuse);

@@ -233,7 +233,7 @@ void EmbeddedWorkspace<S>::certify(const Asked& asked, const S& size) {
     }
   }
   if (worst > S(0))
-    refuse_rows(off_, worst, "no sure accelerations on loops, at a singular state, by rows that ask for different accelerations of one motion or by rounding: off are rows");
+    refuse_rows(off_, worst, "no sure accelerations on loops, at a singular state, by rows that ask for different accelerations of one motion or by rounding (take a wider precision): off are rows");
   for (size_t i = 0; i < load_.size(); ++i) load_[i] = asked.tau[i] - generalized_[i];
   const S energy = embedded_.solve(blocks_, load_.data(), nullptr);
   if (!(sqrt(maximum(energy, S(0))) <= certified() * size))

@@ -82,14 +82,17 @@ int BatchInterbodyForces::Asked::states() const {
   return batch < 0 ? 1 : batch;
 }
 
+void check_wrenches(const PushedNodes* pushed, const Given& wrenches) {
+  for (int b = 0; b < (wrenches.batch < 0 ? 1 : wrenches.batch); ++b)
+    checking_state(b, wrenches.batch, [&] {
+      for (int i = 0; i < wrenches.width; ++i)
+        if (!std::isfinite(wrenches.at(b)[i])) throw ModelError("the wrench on '" + pushed->nodes[i / 6].name + "' has an entry that is not finite");
+    });
+}
+
 void BatchInterbodyForces::check(const Asked& asked) const {
   check_given(model(), {asked.q, asked.v, asked.input});
-  for (int b = 0; b < (asked.wrenches.batch < 0 ? 1 : asked.wrenches.batch); ++b)
-    checking_state(b, asked.wrenches.batch, [&] {
-      for (int i = 0; i < asked.wrenches.width; ++i)
-        if (const double x = asked.wrenches.at(b)[i]; !std::isfinite(x))
-          throw ModelError("the wrench on '" + asked.pushed->nodes[i / 6].name + "' has an entry that is not finite");
-    });
+  check_wrenches(asked.pushed, asked.wrenches);
 }
 
 void BatchInterbodyForces::run(const Asked& asked, const Results& out) {
@@ -140,7 +143,7 @@ void BatchInterbodyForces::derivatives(const Asked& asked, const std::array<doub
   std::vector<Along> q, v, vdot, wrenches;
   std::vector<double> direction(nv), rate(nq);
   const int kinds = forces[1] ? 3 : 1;
-  for (int b = 0; b < states; ++b)
+  const auto one = [&](int b) {
     for (int first = 0; first < kinds * nv; first += width) {
       const int count = std::min(width, kinds * nv - first);
       const auto read = [b](const Given& given, std::vector<Along>& to) { to.assign(given.at(b), given.at(b) + given.width); };
@@ -169,7 +172,9 @@ void BatchInterbodyForces::derivatives(const Asked& asked, const std::array<doub
         for (int l = 0; l < nv; ++l) generalized[kind][(size_t(b) * nv + l) * nv + j] = on.generalized()[l].d[i];
       }
     }
-  for (int kind = 0; kind < kinds; ++kind) require_finite(forces[kind], size_t(states) * N * 6 * nv, model());
+    for (int kind = 0; kind < kinds; ++kind) require_finite(forces[kind] + size_t(b) * N * 6 * nv, size_t(N) * 6 * nv, model());
+  };
+  for (int b = 0; b < states; ++b) naming_state(b, states, [&] { one(b); });
 }
 
 template class InterbodyForces<Single>;

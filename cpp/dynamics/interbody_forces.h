@@ -22,6 +22,8 @@ struct PushedNodes {
   std::vector<Node> nodes;
   bool in_world = true;
 };
+// ModelError that names the node, and the state of a batch, where a wrench is not finite; six numbers a node. pushed may be null where there are none.
+void check_wrenches(const PushedNodes* pushed, const Given& wrenches);
 
 template <class S>
 class InterbodyForces {

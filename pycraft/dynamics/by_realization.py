@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import first_not_finite
 
 
 def by_realization(model: Any, q, v, tau, precision: str | int, out) -> np.ndarray:
@@ -52,15 +53,15 @@ def motion_state(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.n
 
 
 def checked_forces(model: Any, tau: Any, name: str = "tau") -> np.ndarray:
-    """Return generalized forces (nv,) or (B, nv) as an array; a ModelError names the fault, as in the core's direct calls."""
+    """Return generalized forces or accelerations (nv,) or (B, nv) as an array; a ModelError names the fault."""
     nv = model.nv
     forces = _core.real_array(tau, name)
     if forces.ndim not in (1, 2) or forces.shape[-1] != nv:
         raise _core.ModelError(f"{name} of {model.name!r} takes {nv} numbers, or (B, {nv}) for a batch")
-    if not np.isfinite(forces).all():
-        at = tuple(int(i) for i in np.argwhere(~np.isfinite(forces))[0])
-        hinge = next(h for h in model.hinges.values() if h.v_slice.start <= at[-1] < h.v_slice.stop)
-        raise _core.ModelError(f"{name} of hinge {hinge.name!r}: entry {at[-1] - hinge.v_slice.start} is {forces[at]}")
+    if bad := first_not_finite(forces):
+        (at,), value, state = bad
+        hinge = next(h for h in model.hinges.values() if h.v_slice.start <= at < h.v_slice.stop)
+        raise _core.ModelError(f"{name} of hinge {hinge.name!r}: entry {at - hinge.v_slice.start} is {value}{state}")
     return forces
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..arguments import first_not_finite
 from ..state import at_state
 
 
@@ -49,8 +50,8 @@ def embedded_accelerations(model: Any, q: Any = None, v: Any = None, tau: Any = 
         if arrays[name].ndim not in (1, 2) or arrays[name].shape[-1] != width:
             raise _core.ModelError(f"{name} of {model.name!r} takes {width} numbers a state, not an array {arrays[name].shape}")
     q, v, tau = arrays.values()
-    if not np.isfinite(tau).all():
-        raise _core.ModelError(f"tau of {model.name!r} takes {model.nv} finite numbers a state")
+    if bad := first_not_finite(tau):
+        raise _core.ModelError(f"tau of {model.name!r} is {bad[1]} at {model.coordinate_names[bad[0][0]]!r}{bad[2]}")
     try:
         batch = np.broadcast_shapes(q.shape[:-1], v.shape[:-1], tau.shape[:-1])
     except ValueError:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
+from ..arguments import first_not_finite
 from ..closed import Closed
 from ..linear.linear_model import LinearModel
 from ..state import State, at_state
@@ -102,8 +103,8 @@ class QuadraticModel(Closed):
             shapes = " or ".join(dict.fromkeys((f"({n},)", str((*batch, n)))))
             names = ", ".join(self.states[:12]) + (", ..." if n > 12 else "")
             raise _core.ModelError(f"costate of {self._linear.model.name!r} takes {shapes} values, of {names}; it has shape {given.shape}")
-        if not np.isfinite(given).all():
-            raise _core.ModelError(f"costate: entry {int(np.flatnonzero(~np.isfinite(given))[0])} is not finite")
+        if bad := first_not_finite(given):
+            raise _core.ModelError(f"costate: entry {bad[0][0]} is not finite{bad[2]}")
         states = batch[0] if batch else 1
         found = self._curvature.hessians(np.broadcast_to(given, (states, n))[:, None, :])[:, 0]
         return self._cut(found if batch else found[0])

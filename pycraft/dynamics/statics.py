@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..arguments import of_state, switch
+from ..arguments import first_not_finite, of_state, switch
 from ..state import at_state
 from .equilibrium import TOLERANCE, Balance, Equilibrium, solved
 from .equilibrium_on_loops import solved_on_loops
@@ -99,9 +99,8 @@ class StaticsCalls:
             raise _core.ModelError(
                 f"tau of {model.name!r} takes {self.nv} numbers, or (B, {self.nv}) for a batch, not an array {given.shape}"
             )
-        if not np.isfinite(given).all():
-            named = model.coordinate_names[np.argwhere(~np.isfinite(given))[0][-1]]
-            raise _core.ModelError(f"tau of {model.name!r} is not finite at {named!r}")
+        if bad := first_not_finite(given):
+            raise _core.ModelError(f"tau of {model.name!r} is not finite at {model.coordinate_names[bad[0][0]]!r}{bad[2]}")
         states = [x.shape[0] for x, axes in ((starts, 2), (given, 2), (numbers, 3)) if x.ndim == axes]
         if len(set(states)) > 1:
             raise _core.ModelError(f"batches of {' and '.join(map(str, sorted(set(states))))} states in one call")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..arguments import one_number, several, text
+from ..arguments import first_not_finite, one_number, several, text
 from ..closed import Closed
 from ..state import at_state
 from .cholesky import cholesky
@@ -342,8 +342,8 @@ class TaskSpace(Closed):
         x = _core.real_array(given, what)
         if x.ndim == 0 or x.shape[-1] != len(self._names):
             raise _core.ModelError(f"{what} takes {len(self._names)} values, of {', '.join(self._names)}; it has shape {x.shape}")
-        if not np.isfinite(x).all():
-            raise _core.ModelError(f"{what}: entry {self._names[int(np.argwhere(~np.isfinite(x))[0, -1])]!r} is not finite")
+        if bad := first_not_finite(x):
+            raise _core.ModelError(f"{what}: entry {self._names[bad[0][0]]!r} is not finite{bad[2]}")
         return x
 
     def __repr__(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from .. import _core
 from ..arguments import listed, name_of, one_number, pose_parts, several, text
 from ..closed import Closed
+from ..dynamics.by_realization import checked_forces
 from ..dynamics.loop_tangents import RANK
 from ..state import at_state
 from .coordinates import coordinate_numbers
@@ -212,11 +213,7 @@ class Loops(Closed, Mapping):
         [2.0, -2.0, 2.0]
         """
         fix, (q, v) = several(fix), at_state(self._model, q, v)
-        start = np.zeros(self._model.nv) if vdot is None else np.asarray(_core.real_array(vdot, "vdot"), float)
-        if start.ndim not in (1, 2) or start.shape[-1] != self._model.nv or not np.isfinite(start).all():
-            raise _core.ModelError(
-                f"vdot of {self._model.name!r} takes {self._model.nv} finite numbers, or (B, {self._model.nv}) of a batch"
-            )
+        start = np.zeros(self._model.nv) if vdot is None else checked_forces(self._model, vdot, "vdot")
         Q, bias = self.jacobian(q), self.bias(q, v)
         batch = np.broadcast_shapes(bias.shape[:-1], start.shape[:-1])
         start = np.array(np.broadcast_to(start, (*batch, self._model.nv)))

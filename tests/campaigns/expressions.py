@@ -13,13 +13,14 @@ estimate, hence `SLACK`), and at least the roundings of a sweep.
 """
 
 import argparse
+import ctypes
 import faulthandler
+import functools
 import os
 import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -355,7 +356,7 @@ def seed_run(seed, expressions=EXPRESSIONS, note=None):
     for number, tried in enumerate(pool):
         for kind in rng.choice(REQUESTS, 3 if number >= leaves else 2, replace=False):
             kind = str(kind)
-            if kind == "blockdiag" and attempted(partial(pc.blockdiag, tried.op)) is None:
+            if kind == "blockdiag" and attempted(functools.partial(pc.blockdiag, tried.op)) is None:
                 continue
             options = way(rng)
             shape = str(rng.choice(["one", "batch", "packs"], p=[0.45, 0.45, 0.1]))
@@ -400,9 +401,17 @@ REFUSED = ("comes from outside and computes in double precision only", "have no 
 """Messages that refuse a way for a reason of its own."""
 
 
+@functools.cache
+def guard_memory():
+    """Guard the memory of the core where guarded_memory.cpp is preloaded, once a process."""
+    if "guarded_memory" in os.environ.get("LD_PRELOAD", ""):
+        ctypes.CDLL(None).guarded_memory_begin()
+
+
 def noted_run(seed, folder, expressions):
     """`seed_run`, with what it is at in a file, so that a crash says where it was."""
     faulthandler.enable()
+    guard_memory()
     path = Path(folder, f"expressions_{os.getpid()}.txt")
 
     def note(text):

@@ -114,3 +114,81 @@ def test_a_nan_in_wrenches_of_a_batch():
     model = pc.chain(3)
     with pytest.raises(pc.ModelError, match=r"wrench on 'body1' has an entry that is not finite \(state 3 of a batch of 5\)"):
         model.interbody_forces(np.zeros((5, 3)), wrenches={"body1": nan_at((5, 6), 3, 1)})
+    with pytest.raises(pc.ModelError, match=r"wrench on 'body1' has an entry that is not finite \(state 3 of a batch of 5\)"):
+        model.constrained_dynamics(np.zeros((5, 3)), wrenches={"body1": nan_at((5, 6), 3, 1)})
+    with pytest.raises(pc.ModelError, match=r"wrench on 'body1' has an entry that is not finite$"):
+        model.constrained_dynamics(np.zeros(3), wrenches={"body1": nan_at(6, 1)})
+
+
+def geared(part):
+    """A coupling of which one part is NaN where the first coordinate is 2."""
+
+    def function(q):
+        parts = [q[0] - q[1], np.array([1.0, -1.0]), np.zeros((2, 2)), np.zeros((2, 2, 2))]
+        if q[0] == 2:
+            parts[part] = parts[part] * np.nan
+        return tuple(parts)
+
+    model = pc.chain(3)
+    model.add_coupling(["hinge0", "hinge2"], function=function, name="gear")
+    return model
+
+
+PARTS = (
+    "r of the function of coupling 'gear' is nan",
+    "the gradient of the function of coupling 'gear' has an entry that is nan",
+    "the second derivatives of the function of coupling 'gear' has an entry that is nan",
+)
+
+
+@pytest.mark.parametrize("part", range(3))
+def test_a_coupling_that_gives_no_number_is_named_with_its_state(part):
+    """In every call that asks for rows, of one state and of a batch."""
+    model = geared(part)
+    q = np.array([[1.0, 0.5, 1.0], [2.0, 0.5, 0.25], [1.0, 0.0, 1.0]])
+    calls = {
+        "residual": lambda q: model.loops.residual(q),
+        "jacobian": lambda q: model.loops.jacobian(q),
+        "bias": lambda q: model.loops.bias(q, np.zeros(3)),
+        "augmented": lambda q: model.constrained_dynamics(q, np.zeros(3)),
+        "embedded": lambda q: model.constrained_dynamics(q, np.zeros(3), method="embed"),
+        "velocities": lambda q: model.constrained_velocities(q, np.zeros(3)),
+        "operator": lambda q: model.soa.Q.at(q, np.zeros_like(q)).dense(),
+    }
+    for call in calls.values():
+        with pytest.raises(pc.EvaluationError, match=rf"{PARTS[part]} at q = \(2, 0\.25\) \(state 1 of a batch of 3\)"):
+            call(q)
+        with pytest.raises(pc.EvaluationError, match=rf"{PARTS[part]} at q = \(2, 0\.25\)$"):
+            call(q[1])
+
+
+def test_third_derivatives_that_are_no_numbers():
+    model = geared(3)
+    v = np.ones(3)
+    with pytest.raises(pc.EvaluationError, match=r"the third derivatives of .*'gear' has an entry that is nan at q = \(2, 2\)"):
+        model.soa.Q.diff(0).diff(0).at([2.0, 0.0, 2.0], v).dense()
+
+
+def test_what_a_coupling_raises_tells_where():
+    model = pc.chain(3)
+    model.add_coupling(["hinge0", "hinge2"], function=raising, name="gear")
+    with pytest.raises(KeyError) as caught:
+        model.loops.residual(np.array([[2.0, 0.0, 0.25]]))
+    assert caught.value.__notes__ == ["raised by the function of coupling 'gear' at q = (2, 0.25)"]
+
+
+def test_results_beyond_the_range_are_named_with_their_state():
+    model = pc.chain(3)
+    fast = np.zeros((4, 3))
+    fast[2] = 1e200
+    for call in (
+        lambda: model.interbody_forces(np.zeros((4, 3)), fast),
+        lambda: model.inverse_dynamics(np.zeros((4, 3)), fast),
+        lambda: model.forward_dynamics(np.zeros((4, 3)), fast),
+        lambda: model.bias_forces(np.zeros((4, 3)), fast),
+        lambda: model.interbody_forces_derivatives(np.zeros((4, 3)), fast),
+        lambda: model.inverse_dynamics_derivatives(np.zeros((4, 3)), fast, fast),
+        lambda: model.forward_dynamics_derivatives(np.zeros((4, 3)), fast, fast),
+    ):
+        with pytest.raises(pc.EvaluationError, match=r"beyond the range of its numbers.*\(state 2 of a batch of 4\)"):
+            call()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from pycraft.models.linkages import n_four_bar
 
 KINDS = ["universal", "pin", "screw", "slider", "ball", "cylindrical", "gimbal", "universal"]
 CLOSING = ["slider", "pin", "cylindrical", "ball", "universal", "planar"]
@@ -97,11 +98,23 @@ def test_runs_that_start_there(seed):
     assert np.abs(rows / sizes).max() < 1e-9
 
 
-def test_what_conflicts_by_rounding_is_refused_with_the_remedy():
+def test_rows_that_conflict_by_rounding_are_settled_in_the_next_precision():
+    """In double two of three rows depend on each other in units of energy; in their own none does."""
     model, q, v, _ = heavy(4496)
-    with pytest.raises(pc.EvaluationError, match=r"by rounding \(take a wider precision\), of 'heavy 4496': 'closing: about x'"):
-        model.constrained_dynamics(q, v)
-    assert int(model.constrained_dynamics(q, v, precision="quad").rank) == 3
+    found, right = model.constrained_dynamics(q, v), model.constrained_dynamics(q, v, precision="quad")
+    assert int(found.rank) == int(right.rank) == 3
+    np.testing.assert_allclose(found.vdot, right.vdot, rtol=0, atol=1e-6 * np.abs(right.vdot).max())
+    batch = model.constrained_dynamics(np.stack([q, q]), v)
+    assert np.array_equal(batch.vdot[0], found.vdot) and np.array_equal(batch.vdot[1], found.vdot)
+
+
+@pytest.mark.parametrize("precision", ["double", "extended"])
+@pytest.mark.parametrize("off", [0.0, 1e-12, 1e-10])
+def test_rows_that_conflict_at_a_singular_state_are_refused(precision, off):
+    """There they depend on each other in any units, and what a wider scalar would tell apart is how far the state is from singular."""
+    bars = n_four_bar(1)
+    with pytest.raises(pc.EvaluationError, match="different accelerations of one motion.*'loop1: along x'"):
+        bars.constrained_dynamics([off, 0, 0], [1.0, 1.0, -3.0], precision=precision)
 
 
 @pytest.mark.slow

@@ -186,7 +186,7 @@ def test_refusals():
     bars.add_loop("body2", hinge="pin", point=(1, 0, 0), name="closure")
     with pytest.raises(pc.ModelError, match="singular at this state"):
         bars.soa.embedded(q=[0, 0, np.pi])
-    with pytest.raises(pc.ModelError, match="takes 3 finite numbers"):
+    with pytest.raises(pc.ModelError, match="tau of .* is nan at"):
         embedded_accelerations(model, tau=[np.nan, 0, 0])
     with pytest.raises(pc.ModelError, match="not a complete multibody model"):
         soa.embedded()

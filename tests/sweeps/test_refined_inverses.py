@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pycraft as pc
+from support.mechanisms import random_tree
 
 EPS = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-52, "quad": 2.0**-52}  # of what comes out: doubles at best
 
@@ -108,3 +109,21 @@ def test_functions_of_vectors_beside_refined_solves():
             whole = np.array(columns).T
             wanted = np.linalg.solve(whole, y) + np.linalg.solve(B.at(model.q).dense(), y)
             np.testing.assert_allclose(solve.value(a=x, w=y), wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize(("seed", "rules"), [(45, False), (47, False), (53, False), (53, True)])
+def test_diagonal_blocks_read_from_factors_are_refined(seed, rules):
+    """No solve corrects them: all is computed one precision up. In double they are off by 1e-13 here, with theorems by 3e-14."""
+    rng = np.random.default_rng(seed)
+    model = random_tree(rng, int(rng.integers(2, 6)))
+    tip = [list(model.bodies)[-1]]
+    state = model.random_state(rng)
+    op = pc.blockdiag(model.soa.Lambda(tip) + model.soa.Lambda(tip))
+    right = op.at(state.q, state.v, precision="quad").dense()
+    for refine in (1, "auto"):
+        refined = op.at(state.q, state.v, refine=refine)
+        assert np.abs(refined.dense(rules=rules) - right).max() <= 2 * EPS["double"] * np.abs(right).max()
+        x = np.ones(6)
+        assert np.abs(refined @ x - right @ x).max() <= 16 * EPS["double"] * np.abs(right).max()
+    plain = op.at(state.q, state.v).dense(rules=rules)
+    assert np.abs(plain - right).max() > 64 * EPS["double"] * np.abs(right).max()

@@ -132,8 +132,15 @@ Precision precision_of(const Expression& e) {
   return symbols ? *symbols : leaves.value_or(Precision::double_);
 }
 
-// Determinants, traces, diagonals and triangular factors of what is solved have no residual that a solve would correct: refinement of
-// them is the next precision up. Of what is not solved there is none.
+// Whether the plan, or an operand's, takes diagonal blocks from the factors of an elimination, or numbers from triangular factors.
+bool reads_factors(const Plan& plan) {
+  return std::any_of(plan.steps.begin(), plan.steps.end(), [](const Step& s) {
+    return s.kind == StepKind::selected_blocks || (s.kind == StepKind::dense_factor && s.flag) || (s.operand && reads_factors(*s.operand));
+  });
+}
+
+// Determinants, traces, diagonals, triangular factors and diagonal blocks of what is solved have no residual that a solve would correct:
+// refinement of them is the next precision up. Of what is not solved there is none.
 bool refined_by_precision(const Plan& plan) {
   const auto uses = [&](auto which) { return std::any_of(plan.steps.begin(), plan.steps.end(), which); };
   if (uses([](const Step& s) { return s.kind == StepKind::apply_external || (s.operand && std::any_of(s.operand->steps.begin(), s.operand->steps.end(), [](const Step& o) { return o.kind == StepKind::apply_external; })); }))
@@ -145,7 +152,7 @@ bool refined_by_precision(const Plan& plan) {
       return std::any_of(plan.groups.begin(), plan.groups.end(), [](unsigned g) { return (g & (Group::articulated | Group::compliance | Group::inverse)) != 0; }) ||
              uses([](const Step& s) { return s.kind == StepKind::factor || s.kind == StepKind::dense_factor || s.kind == StepKind::invert_blocks || s.operand; });
     case Request::logdet: return true;
-    default: return uses([](const Step& s) { return s.kind == StepKind::dense_factor && s.flag; });
+    default: return reads_factors(plan);
   }
 }
 
