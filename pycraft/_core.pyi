@@ -1454,6 +1454,16 @@ def _binding_from_parts(arg0: typing.SupportsInt | typing.SupportsIndex, arg1: t
     ...
 def _derived_operators(arg0: SkoSource, arg1: typing.Any) -> SkoSource:
     ...
+@typing.overload
+def _diff_on_loops(operand: Operator, of: EmbeddedOperators, coordinate: typing.SupportsInt | typing.SupportsIndex) -> Operator:
+    """
+    The derivative along an independent coordinate of embedded loops, also of letters of the tree alone.
+    """
+@typing.overload
+def _diff_on_loops(operand: Scalar, of: EmbeddedOperators, coordinate: typing.SupportsInt | typing.SupportsIndex) -> Scalar:
+    """
+    The derivative along an independent coordinate of embedded loops, also of letters of the tree alone.
+    """
 def _embedded(base: MultibodyOperators, loops: LoopSet, sets: collections.abc.Sequence[tuple[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]]]) -> EmbeddedOperators:
     """
     Of each set: bodies, rows of loops, dependent coordinates, by number.

@@ -64,7 +64,7 @@ def whole(value: Any, what: str) -> int:
             return operator.index(value)
     except TypeError:
         pass
-    raise _core.ModelError(f"{what}: a whole number, not {value!r}")
+    raise _core.ModelError(f"{what} must be a whole number, not {value!r}")
 
 
 def one_number(value: Any, what: str) -> float:
@@ -116,14 +116,14 @@ def name_of(name: Any, what: str, otherwise: str) -> str:
 def seed_of(seed: Any) -> np.random.Generator:
     """Return the random generator of a seed, or the generator given. ModelError if it is neither."""
     if not isinstance(seed, np.random.Generator) and whole(seed, "seed") < 0:
-        raise _core.ModelError(f"seed: a whole number from 0 on, or a numpy.random.Generator, not {seed!r}")
+        raise _core.ModelError(f"seed must be a whole number from 0 on, or a numpy.random.Generator, not {seed!r}")
     return np.random.default_rng(seed)
 
 
 def parents_of(parents: Any, what: str) -> list[int]:
     """Return the number of each body's parent, smaller than the body's own, -1 for the base. `what`: the owner, for errors."""
     if isinstance(parents, np.ndarray) and parents.ndim != 1:
-        raise _core.ModelError(f"parents of {what}: a list of whole numbers, not an array {parents.shape}")
+        raise _core.ModelError(f"parents of {what} must be a list of whole numbers, not an array {parents.shape}")
     inboard = [whole(p, f"parents of {what}") for p in listed(parents, f"parents of {what}")]
     for k, parent in enumerate(inboard):
         if not -1 <= parent < k:

@@ -143,6 +143,11 @@ void register_calculus(py::module_& m) {
     if (const auto embedded = embedding_of(operands)) return embedded;
     return model_of(operands);
   }, py::arg("operands"), "Whose coordinates diff() is along: embedded loops or a multibody model; None where nothing moves.");
+  const char* on_loops = "The derivative along an independent coordinate of embedded loops, also of letters of the tree alone.";
+  m.def("_diff_on_loops", [](const Expression& e, const std::shared_ptr<EmbeddedOperators>& of, int i) { return differentiate(e, *independent_direction(of, i)); }, py::arg("operand"),
+        py::arg("of"), py::arg("coordinate"), on_loops);
+  m.def("_diff_on_loops", [](const Scalar& s, const std::shared_ptr<EmbeddedOperators>& of, int i) { return differentiate(s, *independent_direction(of, i)); }, py::arg("operand"),
+        py::arg("of"), py::arg("coordinate"), on_loops);
   const char* diff_text =
       "The derivative along a coordinate (its name or number), along a parameter (body.symbol(\"mass\"), hinge.symbol(\"axis\", 0), ...), or\n"
       "along several in turn: diff(i, j) is ∂_j(∂_i ·), and diff([i, j]) the list of both. An expression again, by rule, evaluated by sweeps; zero by structure is the zero\n"

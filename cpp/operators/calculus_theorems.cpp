@@ -62,9 +62,9 @@ struct CalculusTheorems : Statements {
     group = "Calculus along a coordinate";
     const Expression Delta_several = delta_operator(robot, several), Delta_many = delta_operator(robot, many);
     const Expression half = H * phi_tilde * Delta_several * phi * M * phi.T() * H.T();
-    state("∂ℳ", differentiate(MM, *along_several), half + half.T(), "∂ℳ = Hφ̃Δφ Mφ*H* + (…)*", "\\partial\\mathcal{M} = H\\tilde\\phi\\Delta\\phi M\\phi^*H^* + (\\cdots)^*", constant_hinges);
+    state("∂ℳ", differentiate(MM, *along_several), half + half.T(), "∂_iℳ = Hφ̃Δ_iφMφ*H* + HφMφ*Δ_i*φ̃*H*", "\\partial_i\\mathcal{M} = H\\tilde\\phi\\Delta_i\\phi M\\phi^*H^* + H\\phi M\\phi^*\\Delta_i^*\\tilde\\phi^*H^*", constant_hinges);
     const Expression book = H * phi * (Delta_many * phi * M + M * phi.T() * Delta_many.T()) * phi.T() * H.T();
-    state("∂ℳ, single-DOF form", differentiate(MM, *along_many), book, "∂ℳ = Hφ[ΔφM + Mφ*Δ*]φ*H*", "\\partial\\mathcal{M} = H\\phi[\\Delta\\phi M + M\\phi^*\\Delta^*]\\phi^*H^*", single_dof,
+    state("∂ℳ, single-DOF form", differentiate(MM, *along_many), book, "∂_iℳ = Hφ[Δ_iφM + Mφ*Δ_i*]φ*H*", "\\partial_i\\mathcal{M} = H\\phi[\\Delta_i\\phi M + M\\phi^*\\Delta_i^*]\\phi^*H^*", single_dof,
           "Jain 2011");
   }
 
@@ -88,26 +88,27 @@ struct CalculusTheorems : Statements {
     const Expression W = block_diagonal(E.T() * Upsilon * E);
     Scalar gradient = 2.0 * trace(P_plus * W * Delta_i);
     if (dH.kind() != NodeKind::zero) gradient = gradient + 2.0 * trace(dH * (I - P_plus * W) * G);
-    state("gradient of ln det ℳ", differentiate(logdet(MM + J), *along_i), gradient, "∂ ln det(ℳ+J) = 2 tr(P⁺WΔ) + 2 tr(∂H(I-P⁺W)G),  W = blockdiag(E*ΥE)",
-          "\\partial\\ln\\det(\\mathcal{M}+J) = 2\\operatorname{tr}(P^+W\\Delta) + 2\\operatorname{tr}(\\partial H(I-P^+W)\\mathcal{G})", no_hypothesis, "soa.md #35");
+    state("gradient of ln det ℳ", differentiate(logdet(MM + J), *along_i), gradient, "∂_i ln det(ℳ+J) = 2 tr(P⁺WΔ_i) + 2 tr(∂_iH(I-P⁺W)G),  W = blockdiag(E*ΥE)",
+          "\\partial_i\\ln\\det(\\mathcal{M}+J) = 2\\operatorname{tr}(P^+W\\Delta_i) + 2\\operatorname{tr}(\\partial_i H(I-P^+W)\\mathcal{G}),\\quad W = \\operatorname{blockdiag}(\\mathcal{E}_\\phi^*\\Upsilon\\mathcal{E}_\\phi)", no_hypothesis, "soa.md #35");
     const Parameter mass{robot, "mass", {}, robot->structure().bodies() - 1, InertiaParameter::mass, -1};
     const auto by_mass = parameter_direction(mass);
-    state("gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂ ln det(ℳ+J) = tr(Υ∂M)",
-          "\\partial\\ln\\det(\\mathcal{M}+J) = \\operatorname{tr}(\\Upsilon\\,\\partial M)", no_hypothesis, "soa.md #32");
+    state("gradient of ln det ℳ by a mass", differentiate(logdet(MM + J), *by_mass), trace(Upsilon * differentiate(M, *by_mass)), "∂_mass ln det(ℳ+J) = tr(Υ ∂_massM)",
+          "\\partial_{\\mathrm{mass}}\\ln\\det(\\mathcal{M}+J) = \\operatorname{tr}(\\Upsilon\\,\\partial_{\\mathrm{mass}} M)", no_hypothesis, "soa.md #32");
   }
 
   void motion_along_a_coordinate() {
     const Expression e = unit(several);
     const Expression outboard = function(force_cross, E.T() * V);
     const Expression h = make_symbol(definition_of(direction_twist), source, OfCoordinate{several}, robot->structure().coordinate_names[several]);
+    // -h*crf(E*V)p = (E*V)*crf(h)p, and crf(h) is Δ_i
     state("slope of the kinetic energy", 0.5 * differentiate(V.T() * M * V, *along_several), -(h.T() * outboard * p),
-          "∂KE = -h*crf(E*V)p,  p = φMV", "\\partial KE = -h^*\\operatorname{crf}(\\mathcal{E}^*\\mathcal{V})p", constant_hinges, "soa.md #18");
+          "½ ∂_i(V*MV) = V*EΔ_i p,  p = φMV", "\\tfrac12\\partial_i(\\mathcal{V}^*M\\mathcal{V}) = \\mathcal{V}^*\\mathcal{E}_\\phi\\Delta_i p,\\quad p = \\phi M\\mathcal{V}", constant_hinges, "soa.md #18");
     const Expression dV = phi.T() * function(motion_cross, E.T() * V) * H.T() * e;
     const Expression dalpha = phi.T() * (function(motion_cross, E.T() * alpha) * H.T() * e - function(motion_cross, H.T() * qd) * dV);
     state("derivative of inverse dynamics", differentiate(H * f, *along_several),
           H * phi_tilde * function(momentum_cross_of, f) * H.T() * e +
               H * phi * (M * dalpha + (mechanics(momentum_cross) + mechanics(V_bar) * M) * dV),
-          "∂T = Hφ̃𝓕H*e + Hφ(M∂α + (𝓑+V̄M)∂V)", "\\partial T = H\\tilde\\phi\\mathscr{F}H^*e + H\\phi(M\\partial\\alpha+(\\mathscr{B}+\\bar{\\mathcal{V}}M)\\partial\\mathcal{V})",
+          "∂_i(Hf) = Hφ̃Δ_i f + Hφ(M∂_iα + (𝓑+V̄M)∂_iV)", "\\partial_i(Hf) = H\\tilde\\phi\\Delta_i f + H\\phi(M\\partial_i\\alpha+(\\mathscr{B}+\\bar{\\mathcal{V}}M)\\partial_i\\mathcal{V})",
           constant_hinges, "soa.md #25");
   }
 
@@ -118,7 +119,7 @@ struct CalculusTheorems : Statements {
       const int first = robot->structure().dof_offset[k];
       const auto x = coordinate_direction(robot, first), y = coordinate_direction(robot, first + 1), z = coordinate_direction(robot, first + 2);
       state("quasi-derivatives do not commute", differentiate(differentiate(MM, *y), *x) - differentiate(differentiate(MM, *x), *y), differentiate(MM, *z),
-            "[∂_x, ∂_y]ℳ = ∂_zℳ about the axes of a ball or free hinge", "[\\partial_x,\\partial_y]\\mathcal{M} = \\partial_z\\mathcal{M}", no_hypothesis, "soa.md #37");
+            "∂_x∂_yℳ - ∂_y∂_xℳ = ∂_zℳ", "\\partial_x\\partial_y\\mathcal{M} - \\partial_y\\partial_x\\mathcal{M} = \\partial_z\\mathcal{M}", no_hypothesis, "soa.md #37");
       break;
     }
   }
@@ -126,15 +127,15 @@ struct CalculusTheorems : Statements {
   void rates() {
     group = "Calculus along time";
     state("accelerations", dot(V), alpha, "dV/dt = φ*(H*θ̈ + a)", "\\dot{\\mathcal{V}} = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})", no_hypothesis, "soa.md #11");
-    state("forces as rates of momentum", dot(p) + mechanics(V_bar) * p, f, "ṗ + V̄p = f,  p = φMV", "\\dot p + \\bar{\\mathcal{V}}p = f", no_hypothesis, "soa.md #16");
-    state("Hamiltonian form", dot(MM * qd), H * f + mechanics(H_dot) * p - H * mechanics(V_bar) * p, "d(ℳθ̇)/dt = T + Ḣp - HV̄p",
-          "\\tfrac{d}{dt}(\\mathcal{M}\\dot\\theta) = T + \\dot Hp - H\\bar{\\mathcal{V}}p", no_hypothesis, "soa.md #17");
+    state("forces as rates of momentum", dot(p) + mechanics(V_bar) * p, f, "ṗ + V̄p = f,  p = φMV", "\\dot p + \\bar{\\mathcal{V}}p = f,\\quad p = \\phi M\\mathcal{V}", no_hypothesis, "soa.md #16");
+    state("Hamiltonian form", dot(MM * qd), H * f + mechanics(H_dot) * p - H * mechanics(V_bar) * p, "d(ℳθ̇)/dt = Hf + Ḣp - HV̄p",
+          "\\tfrac{d}{dt}(\\mathcal{M}\\dot\\theta) = Hf + \\dot Hp - H\\bar{\\mathcal{V}}p", no_hypothesis, "soa.md #17");
   }
 
   void coriolis_matrix() {
     state("rate of the body Jacobian", J_dot, phi.T() * (mechanics(Delta_theta_dot).T() * phi_tilde.T() * H.T() + mechanics(H_dot).T()),
           "d(φ*H*)/dt = φ*(Δ_θ̇*φ̃*H* + Ḣ*)", "\\tfrac{d}{dt}(\\phi^*H^*) = \\phi^*(\\Delta_{\\dot\\theta}^*\\tilde\\phi^*H^*+\\dot H^*)");
-    state("ℳ̇ - 2C is skew, ℳ̇ by rule", dot(MM) - 2.0 * C, -(dot(MM) - 2.0 * C).T(), "ℳ̇ - 2C = -(ℳ̇ - 2C)*,  ℳ̇ = d(HφMφ*H*)/dt",
+    state("ℳ̇ - 2C is skew, ℳ̇ by rule", dot(MM) - 2.0 * C, -(dot(MM) - 2.0 * C).T(), "ℳ̇ - 2C = -(ℳ̇ - 2C)*",
           "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*", no_hypothesis, "soa.md #21");
     // a coordinate outboard of `many` where there is one
     int k = many, body = 0;
@@ -143,15 +144,15 @@ struct CalculusTheorems : Statements {
       if (robot->structure().parent[c] == body && robot->structure().dof[c] > 0) k = robot->structure().dof_offset[c];
     const auto along_k = coordinate_direction(robot, k);
     state("C is the Christoffel matrix", unit(k).T() * C * unit(many),
-          0.5 * (unit(k).T() * dot(MM) * unit(many) + unit(k).T() * differentiate(MM, *along_many) * qd - unit(many).T() * differentiate(MM, *along_k) * qd), "C(k,i) = ½ Σ_j (∂_jℳ(k,i) + ∂_iℳ(k,j) - ∂_kℳ(i,j)) θ̇_j",
-          "C_{ki} = \\tfrac12\\sum_j(\\partial_j\\mathcal{M}_{ki}+\\partial_i\\mathcal{M}_{kj}-\\partial_k\\mathcal{M}_{ij})\\dot\\theta_j", single_dof, "soa.md #22");
+          0.5 * (unit(k).T() * dot(MM) * unit(many) + unit(k).T() * differentiate(MM, *along_many) * qd - unit(many).T() * differentiate(MM, *along_k) * qd), "e_j*Ce_i = ½(e_j*ℳ̇e_i + e_j*∂_iℳθ̇ - e_i*∂_jℳθ̇)",
+          "e_j^*Ce_i = \\tfrac12(e_j^*\\dot{\\mathcal{M}}e_i + e_j^*\\partial_i\\mathcal{M}\\,\\dot\\theta - e_i^*\\partial_j\\mathcal{M}\\,\\dot\\theta)", single_dof, "soa.md #22");
   }
 
   void diagonalised_dynamics() {
     const Expression m = A * square_root(D), inverse_m = square_root(D).inv() * S, skew = inverse_m * C * inverse_m.T() - dot(m).T() * inverse_m.T();
-    state("diagonalised dynamics: S is skew", skew, -skew.T(), "S = m⁻¹Cm⁻* - ṁ*m⁻* = -S*,  m = [I+HφK]D^½",
-          "S = m^{-1}Cm^{-*}-\\dot m^*m^{-*} = -S^*,\\quad m = [I+H\\phi\\mathcal{K}]\\mathcal{D}^{1/2}", no_hypothesis, "soa.md #23");
-    state("diagonalised dynamics", dot(m.T() * qd) + skew * m.T() * qd, inverse_m * (H * f + J * qdd), "η̇ + Sη = m⁻¹T,  η = m*θ̇", "\\dot\\eta + S\\eta = m^{-1}T,\\quad \\eta = m^*\\dot\\theta",
+    state("diagonalised dynamics: S is skew", skew, -skew.T(), "S = -S*,  S = m⁻¹Cm⁻* - ṁ*m⁻*,  m = [I+HφK]D^½",
+          "S = -S^*,\\quad S = m^{-1}Cm^{-*}-\\dot m^*m^{-*},\\quad m = [I+H\\phi\\mathcal{K}]\\mathcal{D}^{1/2}", no_hypothesis, "soa.md #23");
+    state("diagonalised dynamics", dot(m.T() * qd) + skew * m.T() * qd, inverse_m * (H * f + J * qdd), "η̇ + Sη = m⁻¹T,  S = m⁻¹Cm⁻* - ṁ*m⁻*", "\\dot\\eta + S\\eta = m^{-1}T,\\quad S = m^{-1}Cm^{-*}-\\dot m^*m^{-*}",
           no_hypothesis, "soa.md #24");
   }
 
@@ -159,9 +160,9 @@ struct CalculusTheorems : Statements {
     group = "World frame, calculus";
     const Letters w(std::make_shared<WorldFrame>(robot));
     const Expression X = mechanics(X_world);
-    state("∂M'", d(w.M), d(X * M * X.T()), "∂M' = Δ'M' + M'Δ'*  of  M' = XMX*", "\\partial M' = \\Delta'M'+M'\\Delta'^*", no_hypothesis, "soa.md #53");
-    state("∂H'", d(w.H), d(H * X.inv()), "∂H' = ∂(HX⁻¹)", "\\partial H' = \\partial(HX^{-1})", no_hypothesis, "soa.md #53");
-    state("∂P' and ∂P", d(w.P), X * differentiate_in_world(P, *along_i) * X.T(), "∂P' = X(∂P + ΔP + PΔ*)X*", "\\partial P' = X(\\partial P+\\hat\\Delta P+P\\hat\\Delta^*)X^*",
+    state("∂M_w", d(w.M), d(X * M * X.T()), "∂M_w = ∂(XMX*)", "\\partial M_w = \\partial(XMX^*)", no_hypothesis, "soa.md #53");
+    state("∂H_w", d(w.H), d(H * X.inv()), "∂H_w = ∂(HX⁻¹)", "\\partial H_w = \\partial(HX^{-1})", no_hypothesis, "soa.md #53");
+    state("∂P_w and ∂P", d(w.P), X * differentiate_in_world(P, *along_i) * X.T(), "∂P_w = X∂PX* + ∂XPX* + XP∂X*", "\\partial P_w = X\\partial P X^* + \\partial X\\,PX^* + XP\\,\\partial X^*",
           no_hypothesis, "soa.md #54");
   }
 

@@ -81,10 +81,10 @@ struct AugmentationTheorems : LoopStatements {
     const std::optional<Expression> reach = loops->by_ends();
     if (!reach) return;
     const Expression A = loops->whole("A"), B = node_operator(SymbolId::B, robot, loops->end_names());
-    state("rows of loops by their ends", Q, *reach, "Q = A B*φ*H*", "Q = A\\,B^*\\phi^*H^*", "Jain 2011, ch. 11");
-    state("compliance of the rows", Q * (MM + J).inv() * Q.T(), A * B.T() * Omega * B * A.T(), "Q(ℳ+J)⁻¹Q* = A B*ΩB A*",
-          "Q(\\mathcal{M}+J)^{-1}Q^* = A\\,B^*\\Omega B\\,A^*", "soa.md #63");
-    state("rate of the rows", dot(Q), dot(*reach), "Q̇ = d(A B*φ*H*)/dt", "\\dot Q = \\tfrac{d}{dt}(A\\,B^*\\phi^*H^*)", "the product rule");
+    state("rows of loops by their ends", Q, *reach, "Q = A B_e*φ*H*", "Q = A\\,B_e^*\\phi^*H^*", "Jain 2011, ch. 11");
+    state("compliance of the rows", Q * (MM + J).inv() * Q.T(), A * B.T() * Omega * B * A.T(), "Q(ℳ+J)⁻¹Q* = A B_e*ΩB_e A*",
+          "Q(\\mathcal{M}+J)^{-1}Q^* = A\\,B_e^*\\Omega B_e\\,A^*", "soa.md #63");
+    state("rate of the rows", dot(Q), dot(*reach), "Q̇ = d(A B_e*φ*H*)/dt", "\\dot Q = \\tfrac{d}{dt}(A\\,B_e^*\\phi^*H^*)", "the product rule");
   }
 
   void multipliers() {
@@ -93,15 +93,15 @@ struct AugmentationTheorems : LoopStatements {
     const Expression q = picked(rows, Q.codomain().dimension(), "S") * Q;
     const Expression inverse = (MM + J).inv(), compliance = q * inverse * q.T();
     const Expression free = inverse * (T - bias), lambda = -(compliance.inv() * (q * free + dot(q) * qd)), accelerations = on_loops(q, dot(q) * qd);
-    state("tree augmentation: the rows are kept", q * accelerations, -(dot(q) * qd), "Qθ̈ = -Q̇θ̇,  θ̈ = θ̈_f + (ℳ+J)⁻¹Q*λ,  Q(ℳ+J)⁻¹Q*λ = -(Qθ̈_f + Q̇θ̇)",
-          "Q\\ddot\\theta = -\\dot Q\\dot\\theta,\\quad \\ddot\\theta=\\ddot\\theta_f+(\\mathcal{M}+J)^{-1}Q^*\\lambda", "soa.md #63");
-    state("tree augmentation: the equations of motion", (MM + J) * accelerations + bias, T + q.T() * lambda, "(ℳ+J)θ̈ + 𝒞 = T + Q*λ",
-          "(\\mathcal{M}+J)\\ddot\\theta+\\mathcal{C} = T + Q^*\\lambda", "soa.md #63");
+    state("tree augmentation: the rows are kept", q * accelerations, -(dot(q) * qd), "Q_sδ = -Q̇_sθ̇,  δ = β + (ℳ+J)⁻¹Q_s*λ,  λ = -(Q_s(ℳ+J)⁻¹Q_s*)⁻¹(Q_sβ + Q̇_sθ̇),  β = (ℳ+J)⁻¹(T - Hφ(Mφ*a + b))",
+          "Q_s\\delta = -\\dot Q_s\\dot\\theta,\\quad \\delta=\\beta+(\\mathcal{M}+J)^{-1}Q_s^*\\lambda,\\quad \\lambda = -(Q_s(\\mathcal{M}+J)^{-1}Q_s^*)^{-1}(Q_s\\beta+\\dot Q_s\\dot\\theta),\\quad \\beta = (\\mathcal{M}+J)^{-1}(T-H\\phi(M\\phi^*\\mathfrak{a}+\\mathfrak{b}))", "soa.md #63");
+    state("tree augmentation: the equations of motion", (MM + J) * accelerations + bias, T + q.T() * lambda, "(ℳ+J)δ + Hφ(Mφ*a + b) = T + Q_s*λ,  δ = β + (ℳ+J)⁻¹Q_s*λ,  λ = -(Q_s(ℳ+J)⁻¹Q_s*)⁻¹(Q_sβ + Q̇_sθ̇),  β = (ℳ+J)⁻¹(T - Hφ(Mφ*a + b))",
+          "(\\mathcal{M}+J)\\delta+H\\phi(M\\phi^*\\mathfrak{a}+\\mathfrak{b}) = T + Q_s^*\\lambda,\\quad \\delta=\\beta+(\\mathcal{M}+J)^{-1}Q_s^*\\lambda,\\quad \\lambda = -(Q_s(\\mathcal{M}+J)^{-1}Q_s^*)^{-1}(Q_s\\beta+\\dot Q_s\\dot\\theta),\\quad \\beta = (\\mathcal{M}+J)^{-1}(T-H\\phi(M\\phi^*\\mathfrak{a}+\\mathfrak{b}))", "soa.md #63");
     const Expression left_free = I - inverse * q.T() * compliance.inv() * q;
-    state("what loops leave free", left_free * left_free, left_free, "N² = N,  N = I - (ℳ+J)⁻¹Q*(Q(ℳ+J)⁻¹Q*)⁻¹Q",
-          "N^2=N,\\quad N = I-(\\mathcal{M}+J)^{-1}Q^*(Q(\\mathcal{M}+J)^{-1}Q^*)^{-1}Q", "a projection");
-    state("loops' impulses do no work on what is left free", left_free.T() * (MM + J) * left_free, (MM + J) * left_free, "N*(ℳ+J)N = (ℳ+J)N",
-          "N^*(\\mathcal{M}+J)N = (\\mathcal{M}+J)N", "Gauss's principle");
+    state("what loops leave free", left_free * left_free, left_free, "N² = N,  N = I - (ℳ+J)⁻¹Q_s*(Q_s(ℳ+J)⁻¹Q_s*)⁻¹Q_s",
+          "N^2=N,\\quad N = I-(\\mathcal{M}+J)^{-1}Q_s^*(Q_s(\\mathcal{M}+J)^{-1}Q_s^*)^{-1}Q_s", "a projection");
+    state("loops' impulses do no work on what is left free", left_free.T() * (MM + J) * left_free, (MM + J) * left_free, "N*(ℳ+J)N = (ℳ+J)N,  N = I - (ℳ+J)⁻¹Q_s*(Q_s(ℳ+J)⁻¹Q_s*)⁻¹Q_s",
+          "N^*(\\mathcal{M}+J)N = (\\mathcal{M}+J)N,\\quad N = I-(\\mathcal{M}+J)^{-1}Q_s^*(Q_s(\\mathcal{M}+J)^{-1}Q_s^*)^{-1}Q_s", "Gauss's principle");
   }
 };
 
@@ -113,15 +113,15 @@ struct EmbeddingTheorems : LoopStatements {
 
   void blocks() {
     group = "Loops embedded";
-    state("compound hinge map", H, X.T() * groups.H, "H_C = X*H_g", "H_C = X^*H_g", "soa.md #60");
-    if (embedded->traits().hinge_diagonal) state("compound hinge-diagonal term", J, X.T() * groups.J * X, "J_C = X*J_g X", "J_C = X^*J_gX", "soa.md #60");
-    state("compound mass matrix, by groups", own_MM, X.T() * groups.H * groups.phi * groups.M * groups.phi.T() * groups.H.T() * X, "ℳ_C = X*ℳ_g X",
-          "\\mathcal{M}_C = X^*\\mathcal{M}_gX", "soa.md #60");
-    state("compound mass matrix", own_MM, X.T() * MM * X, "ℳ_C = X*ℳX", "\\mathcal{M}_C = X^*\\mathcal{M}X", "soa.md #60");
-    state("velocities of embedded loops", phi.T() * H.T() * thetad_r, groups.phi.T() * groups.H.T() * X * thetad_r, "φ*H_C*θ̇_r = φ*H_g*Xθ̇_r",
-          "\\phi^*H_C^*\\dot\\theta_r = \\phi^*H_g^*X\\dot\\theta_r", "soa.md #60");
-    state("Coriolis acceleration of embedded loops", own_a, a_g + groups.H.T() * X_dot * thetad_r, "a_C = a_g + H_g*Ẋθ̇_r",
-          "\\mathfrak{a}_C = \\mathfrak{a}_g + H_g^*\\dot X\\dot\\theta_r", "soa.md #62");
+    state("compound hinge map", H, X.T() * groups.H, "H_r = X_r*H_g", "H_r = X_r^*H_g", "soa.md #60");
+    if (embedded->traits().hinge_diagonal) state("compound hinge-diagonal term", J, X.T() * groups.J * X, "J_r = X_r*J_gX_r", "J_r = X_r^*J_gX_r", "soa.md #60");
+    state("compound mass matrix, by groups", own_MM, X.T() * groups.H * groups.phi * groups.M * groups.phi.T() * groups.H.T() * X, "ℳ_r = X_r*ℳ_gX_r",
+          "\\mathcal{M}_r = X_r^*\\mathcal{M}_gX_r", "soa.md #60");
+    state("compound mass matrix", own_MM, X.T() * MM * X, "ℳ_r = X_r*ℳX_r", "\\mathcal{M}_r = X_r^*\\mathcal{M}X_r", "soa.md #60");
+    state("velocities of embedded loops", phi.T() * H.T() * thetad_r, groups.phi.T() * groups.H.T() * X * thetad_r, "φ_r*H_r*θ̇_r = φ_g*H_g*X_rθ̇_r",
+          "\\phi_r^*H_r^*\\dot\\theta_r = \\phi_g^*H_g^*X_r\\dot\\theta_r", "soa.md #60");
+    state("Coriolis acceleration of embedded loops", own_a, a_g + groups.H.T() * X_dot * thetad_r, "a_r = a_g + H_g*Ẋ_rθ̇_r",
+          "\\mathfrak{a}_r = \\mathfrak{a}_g + H_g^*\\dot X_r\\dot\\theta_r", "soa.md #62");
   }
 
   // Of the rows that are solved: the others hang on them where the loops are closed, which numbers are to their last digit only.
@@ -131,26 +131,26 @@ struct EmbeddingTheorems : LoopStatements {
     for (const EmbeddedLoops& set : embedded->sets())
       for (int i : set.dependent) ones[size_t(i) * nv + i] = 1;
     const Expression dependent = constant(std::move(ones), robot->theta(), robot->theta(), "I_d");
-    state("rows are kept by independent velocities", q * dependent * X, -(q * (tree.I - dependent) * X), "Q_d X_d = -Q_r X_r", "Q_dX_d = -Q_rX_r", "soa.md #60");
-    state("rate of the map", q * X_dot, -(dot(q) * X), "QẊ = -Q̇X", "Q\\dot X = -\\dot QX", "soa.md #62");
-    state("rows are kept by accelerations", q * (X * thetadd_r + X_dot * thetad_r), -(dot(q) * X * thetad_r), "Q(Xθ̈_r + Ẋθ̇_r) = -Q̇Xθ̇_r",
-          "Q(X\\ddot\\theta_r+\\dot X\\dot\\theta_r) = -\\dot QX\\dot\\theta_r", "soa.md #62");
+    state("rows are kept by independent velocities", q * dependent * X, -(q * (tree.I - dependent) * X), "Q_sX_r = 0", "Q_sX_r = 0", "soa.md #60");
+    state("rate of the map", q * X_dot, -(dot(q) * X), "Q_sẊ_r = -Q̇_sX_r", "Q_s\\dot X_r = -\\dot Q_sX_r", "soa.md #62");
+    state("rows are kept by accelerations", q * (X * thetadd_r + X_dot * thetad_r), -(dot(q) * X * thetad_r), "Q_s(X_rθ̈_r + Ẋ_rθ̇_r) = -Q̇_sX_rθ̇_r",
+          "Q_s(X_r\\ddot\\theta_r+\\dot X_r\\dot\\theta_r) = -\\dot Q_sX_r\\dot\\theta_r", "soa.md #62");
   }
 
   void equations_of_motion() {
     const Expression all = X * thetadd_r + X_dot * thetad_r;
     state("accelerations of embedded loops", phi.T() * (H.T() * thetadd_r + own_a), groups.phi.T() * (groups.H.T() * all + a_g),
-          "φ*(H_C*θ̈_r + a_C) = φ*(H_g*θ̈ + a_g),  θ̈ = Xθ̈_r + Ẋθ̇_r", "\\phi^*(H_C^*\\ddot\\theta_r+\\mathfrak{a}_C) = \\phi^*(H_g^*\\ddot\\theta+\\mathfrak{a}_g)", "soa.md #62");
+          "φ_r*(H_r*θ̈_r + a_r) = φ_g*(H_g*δ + a_g),  δ = X_rθ̈_r + Ẋ_rθ̇_r", "\\phi_r^*(H_r^*\\ddot\\theta_r+\\mathfrak{a}_r) = \\phi_g^*(H_g^*\\delta+\\mathfrak{a}_g),\\quad \\delta = X_r\\ddot\\theta_r+\\dot X_r\\dot\\theta_r", "soa.md #62");
     const Expression b_g = of_groups(gyroscopic_force), more = X.T() * groups.J * X_dot * thetad_r;
     const Expression own_bias = H * phi * (M * phi.T() * own_a + b_g) + more;
     state("equations of motion of embedded loops", (own_MM + J) * thetadd_r + own_bias,
-          X.T() * (groups.H * groups.phi * (groups.M * groups.phi.T() * (groups.H.T() * all + a_g) + b_g) + groups.J * all), "(ℳ_C+J_C)θ̈_r + 𝒞_C = X*((ℳ+J)θ̈ + 𝒞)",
-          "(\\mathcal{M}_C+J_C)\\ddot\\theta_r+\\mathcal{C}_C = X^*((\\mathcal{M}+J)\\ddot\\theta+\\mathcal{C})", "soa.md #62");
+          X.T() * (groups.H * groups.phi * (groups.M * groups.phi.T() * (groups.H.T() * all + a_g) + b_g) + groups.J * all), "(ℳ_r+J_r)θ̈_r + 𝒞_r = X_r*((ℳ_g+J_g)δ + 𝒞_g),  δ = X_rθ̈_r + Ẋ_rθ̇_r",
+          "(\\mathcal{M}_r+J_r)\\ddot\\theta_r+\\mathcal{C}_r = X_r^*((\\mathcal{M}_g+J_g)\\delta+\\mathcal{C}_g),\\quad \\delta = X_r\\ddot\\theta_r+\\dot X_r\\dot\\theta_r", "soa.md #62");
     if (q.codomain().dimension() == 0) return;  // couplings of nothing
     const Expression by_tree = on_loops(q, dot(q) * X * thetad_r);
     const Expression S = I - H * psi * K, independent = S.T() * D.inv() * S * (X.T() * T - own_bias);
-    state("both ways lead to the same accelerations", X * independent + X_dot * thetad_r, by_tree, "X(ℳ_C+J_C)⁻¹(X*T - 𝒞_C) + Ẋθ̇_r = θ̈_f + (ℳ+J)⁻¹Q*λ",
-          "X(\\mathcal{M}_C+J_C)^{-1}(X^*T-\\mathcal{C}_C)+\\dot X\\dot\\theta_r = \\ddot\\theta_f+(\\mathcal{M}+J)^{-1}Q^*\\lambda", "soa.md #60, #63");
+    state("both ways lead to the same accelerations", X * independent + X_dot * thetad_r, by_tree, "X_r(ℳ_r+J_r)⁻¹(X_r*T - 𝒞_r) + Ẋ_rθ̇_r = β + (ℳ+J)⁻¹Q_s*λ,  λ = -(Q_s(ℳ+J)⁻¹Q_s*)⁻¹(Q_sβ + Q̇_sX_rθ̇_r),  β = (ℳ+J)⁻¹(T - Hφ(Mφ*a + b))",
+          "X_r(\\mathcal{M}_r+J_r)^{-1}(X_r^*T-\\mathcal{C}_r)+\\dot X_r\\dot\\theta_r = \\beta+(\\mathcal{M}+J)^{-1}Q_s^*\\lambda,\\quad \\lambda = -(Q_s(\\mathcal{M}+J)^{-1}Q_s^*)^{-1}(Q_s\\beta+\\dot Q_sX_r\\dot\\theta_r),\\quad \\beta = (\\mathcal{M}+J)^{-1}(T-H\\phi(M\\phi^*\\mathfrak{a}+\\mathfrak{b}))", "soa.md #60, #63");
   }
 
   void calculus() {
@@ -166,12 +166,12 @@ struct EmbeddingTheorems : LoopStatements {
       unit[i] = 1;
       const Expression e = constant(std::move(unit), Space::euclidean(1), embedded->theta(), "e" + std::to_string(i));
       const Expression H_S = of_groups(inner_H), phi_S = of_groups(inner_phi), Delta = block_function(definition_of(force_cross), groups.source, nullptr, H_S.T() * X * e);
-      state("derivative of the compound hinge map", d(H), dX.T() * groups.H + X.T() * H_S * (phi_S - I) * Delta * phi_S, "∂H_C = ∂X*H_Sφ_S + X*H_Sφ̃_SΔ_Xφ_S",
-            "\\partial H_C = \\partial X^*H_S\\phi_S + X^*H_S\\tilde\\phi_S\\Delta_X\\phi_S", "soa.md #61");
+      state("derivative of the compound hinge map", d(H), dX.T() * groups.H + X.T() * H_S * (phi_S - I) * Delta * phi_S, "∂H_r = ∂X_r*H_Sφ_S + X_r*H_Sφ̃_SΔ_Xφ_S",
+            "\\partial H_r = \\partial X_r^*H_S\\phi_S + X_r^*H_S\\tilde\\phi_S\\Delta_X\\phi_S", "soa.md #61");
     }
-    state("derivative of the compound mass matrix", d(own_MM), dX.T() * MM * X + X.T() * d(MM) * X + X.T() * MM * dX, "∂ℳ_C = ∂X*ℳX + X*∂ℳX + X*ℳ∂X",
-          "\\partial\\mathcal{M}_C = \\partial X^*\\mathcal{M}X + X^*\\partial\\mathcal{M}X + X^*\\mathcal{M}\\partial X", "soa.md #61");
-    state("derivative of the compound articulated inertia", d(P), d(M + E_psi * P * E.T()), "∂P = ∂(M + E_ψPE_φ*)", "\\partial P = \\partial(M + \\mathcal{E}_\\psi P\\mathcal{E}_\\phi^*)",
+    state("derivative of the compound mass matrix", d(own_MM), dX.T() * MM * X + X.T() * d(MM) * X + X.T() * MM * dX, "∂ℳ_r = ∂X_r*ℳX_r + X_r*∂ℳX_r + X_r*ℳ∂X_r",
+          "\\partial\\mathcal{M}_r = \\partial X_r^*\\mathcal{M}X_r + X_r^*\\partial\\mathcal{M}X_r + X_r^*\\mathcal{M}\\partial X_r", "soa.md #61");
+    state("derivative of the compound articulated inertia", d(P), d(M + E_psi * P * E.T()), "∂P_r = ∂(M_r + E_ψ_rP_rE_r*)", "\\partial P_r = \\partial(M_r + \\mathcal{E}_{\\psi_r} P_r\\mathcal{E}_r^*)",
           "soa.md #61");
   }
 

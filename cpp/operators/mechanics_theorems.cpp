@@ -33,7 +33,8 @@ struct MechanicsTheorems : Statements {
     shown("T = (ℳ+J) θ̈ + 𝒞", "T = (\\mathcal{M}+J)\\ddot\\theta + \\mathcal{C}");
     const Expression z = psi * (K * torque + P * a + b), epsilon = torque - H * z, nu = D.inv() * epsilon;
     state("forward dynamics", S.T() * nu - K.T() * psi.T() * a, qdd);
-    shown("[I-HψK]* ν - K*ψ* a = θ̈,  ν = D⁻¹(T - Hz),  z = ψ(KT + Pa + b)", "[I-H\\psi\\mathcal{K}]^*\\nu - \\mathcal{K}^*\\psi^*\\mathfrak{a} = \\ddot\\theta,\\quad \\nu = \\mathcal{D}^{-1}(T-Hz)");
+    shown("[I-HψK]* ν - K*ψ* a = θ̈,  ν = D⁻¹(T - b_J - Hz),  z = ψ(K(T - b_J) + Pa + b)",
+          "[I-H\\psi\\mathcal{K}]^*\\nu - \\mathcal{K}^*\\psi^*\\mathfrak{a} = \\ddot\\theta,\\quad \\nu = \\mathcal{D}^{-1}(T-\\mathfrak{b}_J-Hz),\\quad z = \\psi(\\mathcal{K}(T-\\mathfrak{b}_J)+P\\mathfrak{a}+\\mathfrak{b})");
     state("accelerations by innovations", psi.T() * (H.T() * nu + a), alpha);
     shown("ψ*(H*ν + a) = φ*(H*θ̈ + a)", "\\psi^*(H^*\\nu+\\mathfrak{a}) = \\phi^*(H^*\\ddot\\theta+\\mathfrak{a})");
     state("interbody forces by innovations", P * (alpha - a) + z, f);
@@ -41,7 +42,7 @@ struct MechanicsTheorems : Statements {
     state("forces without hinge quantities", P_plus * E.T() * alpha + z + G * epsilon, f, no_hypothesis, "soa.md #13");
     shown("P⁺E*α + z + Gε = f", "P^{+}\\mathcal{E}^*\\alpha + z + \\mathcal{G}\\epsilon = f");
     state("accelerations by Ω", phi.T() * H.T() * (MM + J).inv() * torque + (I - Omega * M) * phi.T() * a - Omega * b, alpha, no_hypothesis, "soa.md #14");
-    shown("φ*H*(ℳ+J)⁻¹T + (I-ΩM)φ*a - Ωb = α", "\\phi^*H^*(\\mathcal{M}+J)^{-1}T + (I-\\Omega M)\\phi^*\\mathfrak{a} - \\Omega\\mathfrak{b} = \\alpha");
+    shown("φ*H*(ℳ+J)⁻¹(T - b_J) + (I-ΩM)φ*a - Ωb = α", "\\phi^*H^*(\\mathcal{M}+J)^{-1}(T-\\mathfrak{b}_J) + (I-\\Omega M)\\phi^*\\mathfrak{a} - \\Omega\\mathfrak{b} = \\alpha");
   }
 
   void innovations() {
@@ -58,7 +59,7 @@ struct MechanicsTheorems : Statements {
       for (int i = 0; i < 6; ++i) pick[size_t(i) * robot->structure().dimension() + i] = 1;
       const Expression root = constant(std::move(pick), robot->forces(), Space::euclidean(6), "root");
       state("momentum matrix about the root", root * phi * R * H.T(), root * phi * M * phi.T() * H.T(), no_hypothesis, "soa.md #19");
-      shown("[φRH*] = [φMφ*H*] in the root's rows", "[\\phi\\mathcal{R}H^*]_{\\text{root}} = [\\phi M\\phi^*H^*]_{\\text{root}}");
+      shown("[φRH*](r,k) = [φMφ*H*](r,k), r a root", "[\\phi\\mathcal{R}H^*]\\,(r,k) = [\\phi M\\phi^*H^*]\\,(r,k),\\quad r\\text{ a root}");
     }
   }
 
@@ -71,13 +72,17 @@ struct MechanicsTheorems : Statements {
     const Expression half = (mechanics(H_dot) * phi + H * phi_tilde * mechanics(Delta_theta_dot) * phi) * M * phi.T() * H.T();
     const Expression rate = half + half.T();  // ℳ̇
     state("C θ̇ is the Coriolis force", C_skew * qd, bias);
-    shown("C θ̇ = 𝒞,  C = Hφ(MJ̇ + 𝓑J)", "C\\dot\\theta = \\mathcal{C},\\quad C = H\\phi(M\\dot{J}+\\mathscr{B}J)");
+    shown("Cθ̇ = Hφ(Mφ*a + b),  C = Hφ(M d(φ*H*)/dt + 𝓑φ*H*)",
+          "C\\dot\\theta = H\\phi(M\\phi^*\\mathfrak{a}+\\mathfrak{b}),\\quad C = H\\phi(M\\tfrac{d}{dt}(\\phi^*H^*)+\\mathscr{B}\\phi^*H^*)");
     state("ℳ̇ - 2C is skew", rate - 2 * C_skew, -(rate - 2 * C_skew).T());
-    shown("ℳ̇ - 2C = -(ℳ̇ - 2C)*", "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*");
+    shown("ℳ̇ - 2C = -(ℳ̇ - 2C)*,  C = Hφ(M d(φ*H*)/dt + 𝓑φ*H*)",
+          "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*,\\quad C = H\\phi(M\\tfrac{d}{dt}(\\phi^*H^*)+\\mathscr{B}\\phi^*H^*)");
     state("the Christoffel-consistent C gives the same force", C_christoffel * qd, bias, no_hypothesis, "soa.md #20");
-    shown("C θ̇ = 𝒞,  C = Hφ(MJ̇ + ½(𝓑 + V̄M + MṼ)J)", "C\\dot\\theta = \\mathcal{C},\\quad C = H\\phi(M\\dot{J}+\\tfrac12(\\mathscr{B}+\\bar{\\mathcal{V}}M+M\\tilde{\\mathcal{V}})J)");
+    shown("Cθ̇ = Hφ(Mφ*a + b),  C = Hφ(M d(φ*H*)/dt + ½(𝓑 + V̄M + MṼ)φ*H*)",
+          "C\\dot\\theta = H\\phi(M\\phi^*\\mathfrak{a}+\\mathfrak{b}),\\quad C = H\\phi(M\\tfrac{d}{dt}(\\phi^*H^*)+\\tfrac12(\\mathscr{B}+\\bar{\\mathcal{V}}M+M\\tilde{\\mathcal{V}})\\phi^*H^*)");
     state("ℳ̇ - 2C is skew for the Christoffel-consistent C", rate - 2 * C_christoffel, -(rate - 2 * C_christoffel).T(), no_hypothesis, "soa.md #21");
-    shown("ℳ̇ - 2C = -(ℳ̇ - 2C)* for that C", "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*\\text{ for that }C");
+    shown("ℳ̇ - 2C = -(ℳ̇ - 2C)*,  C = Hφ(M d(φ*H*)/dt + ½(𝓑 + V̄M + MṼ)φ*H*)",
+          "\\dot{\\mathcal{M}} - 2C = -(\\dot{\\mathcal{M}} - 2C)^*,\\quad C = H\\phi(M\\tfrac{d}{dt}(\\phi^*H^*)+\\tfrac12(\\mathscr{B}+\\bar{\\mathcal{V}}M+M\\tilde{\\mathcal{V}})\\phi^*H^*)");
   }
 
   void gravity() {
@@ -91,15 +96,15 @@ struct MechanicsTheorems : Statements {
     const Letters w(world);
     const Expression X = mechanics(X_world);
     state("X E X⁻¹ is constant", X * E * X.inv(), w.E, no_hypothesis, "soa.md #51");
-    shown("X E X⁻¹ = E' (parent matrix ⊗ 1)", "X\\mathcal{E}_\\phi X^{-1} = \\mathcal{E}_\\phi'");
-    state("P' = XPX*", w.P, X * P * X.T(), no_hypothesis, "soa.md #52");
-    shown("P' = X P X*", "P' = XPX^*");
-    state("D' = D", w.D, D, no_hypothesis, "soa.md #52");
-    shown("D' = D", "\\mathcal{D}' = \\mathcal{D}");
-    state("G' = XG", w.G, X * G, no_hypothesis, "soa.md #52");
-    shown("G' = X G", "\\mathcal{G}' = X\\mathcal{G}");
-    state("ψ' = XψX⁻¹", w.psi, X * psi * X.inv(), no_hypothesis, "soa.md #52");
-    shown("ψ' = X ψ X⁻¹", "\\psi' = X\\psi X^{-1}");
+    shown("X E X⁻¹ = E_w", "X\\mathcal{E}_\\phi X^{-1} = \\mathcal{E}_w");
+    state("P_w = XPX*", w.P, X * P * X.T(), no_hypothesis, "soa.md #52");
+    shown("P_w = XPX*", "P_w = XPX^*");
+    state("D_w = D", w.D, D, no_hypothesis, "soa.md #52");
+    shown("D_w = D", "\\mathcal{D}_w = \\mathcal{D}");
+    state("G_w = XG", w.G, X * G, no_hypothesis, "soa.md #52");
+    shown("G_w = XG", "\\mathcal{G}_w = X\\mathcal{G}");
+    state("ψ_w = XψX⁻¹", w.psi, X * psi * X.inv(), no_hypothesis, "soa.md #52");
+    shown("ψ_w = XψX⁻¹", "\\psi_w = X\\psi X^{-1}");
   }
 
   void hybrid_dynamics() {
@@ -119,9 +124,10 @@ struct MechanicsTheorems : Statements {
     const Expression S_f = I - F.H * F.psi * F.K;
     const Expression z_f = F.psi * (F.K * T_f + F.P * a_p + b), nu_f = F.D.inv() * (T_f - F.H * z_f);
     state("hybrid forward dynamics", S_f.T() * nu_f - F.K.T() * F.psi.T() * a_p, qdd_f, no_hypothesis, "soa.md #38");
-    shown("[I-H_fψ_fK_f]*ν_f - K_f*ψ_f*a' = θ̈_f,  a' = a + H_p*θ̈_p", "[I-H_f\\psi_f\\mathcal{K}_f]^*\\nu_f - \\mathcal{K}_f^*\\psi_f^*\\mathfrak{a}' = \\ddot\\theta_f,\\quad \\mathfrak{a}'=\\mathfrak{a}+H_p^*\\ddot\\theta_p");
+    shown("[I-H_fψ_fK_f]*ν_f - K_f*ψ_f*a_f = θ̈_f,  a_f = a + H_p*θ̈_p", "[I-H_f\\psi_f\\mathcal{K}_f]^*\\nu_f - \\mathcal{K}_f^*\\psi_f^*\\mathfrak{a}_f = \\ddot\\theta_f,\\quad \\mathfrak{a}_f=\\mathfrak{a}+H_p^*\\ddot\\theta_p");
     state("prescribed hinges' forces", Q.H * (F.P * (F.psi.T() * (F.H.T() * nu_f + a_p) - a_p) + z_f), T_p, no_hypothesis, "soa.md #39");
-    shown("T_p = H_p(P_f(α - a') + z_f)", "T_p = H_p(P_f(\\alpha-\\mathfrak{a}')+z_f)");
+    shown("T_p = H_p(P_f(β - a_f) + z_f),  β = ψ_f*(H_f*ν_f + a_f),  a_f = a + H_p*θ̈_p",
+          "T_p = H_p(P_f(\\beta-\\mathfrak{a}_f)+z_f),\\quad \\beta=\\psi_f^*(H_f^*\\nu_f+\\mathfrak{a}_f),\\quad \\mathfrak{a}_f=\\mathfrak{a}+H_p^*\\ddot\\theta_p");
     const Expression MM_ff = F.H * phi * M * phi.T() * F.H.T(), MM_fp = F.H * phi * M * phi.T() * Q.H.T(), MM_pp = Q.H * phi * M * phi.T() * Q.H.T();
     const Expression Y = F.psi.T() - F.Omega * F.P;
     const Expression schur = MM_pp - MM_fp.T() * (MM_ff + F.J).inv() * MM_fp;
@@ -132,7 +138,7 @@ struct MechanicsTheorems : Statements {
     state("ℳ_ff⁻¹ℳ_fp by the factors", (MM_ff + F.J).inv() * MM_fp, (F.K.T() * F.psi.T() + S_f.T() * F.D.inv() * F.H * F.psi * F.P) * Q.H.T(), no_hypothesis,
           "soa.md #42");
     shown("(ℳ_ff+J_f)⁻¹ℳ_fp = (K_f*ψ_f* + [I-H_fψ_fK_f]*D_f⁻¹H_fψ_fP_f)H_p*", "(\\mathcal{M}_{ff}+J_f)^{-1}\\mathcal{M}_{fp} = (\\mathcal{K}_f^*\\psi_f^* + [I-H_f\\psi_f\\mathcal{K}_f]^*\\mathcal{D}_f^{-1}H_f\\psi_fP_f)H_p^*");
-    state("determinants of the partition", logdet(MM), logdet(MM_ff) + logdet(schur), no_hinge_diagonal, "soa.md #43");
+    state("determinants of the partition", logdet(MM), logdet(MM_ff) + logdet(MM_pp - MM_fp.T() * MM_ff.inv() * MM_fp), no_hypothesis, "soa.md #43");
     shown("ln det ℳ = ln det ℳ_ff + ln det(ℳ_pp - ℳ_pf(ℳ_ff)⁻¹ℳ_fp)", "\\ln\\det\\mathcal{M} = \\ln\\det\\mathcal{M}_{ff}+\\ln\\det(\\mathcal{M}_{pp}-\\mathcal{M}_{pf}\\mathcal{M}_{ff}^{-1}\\mathcal{M}_{fp})");
   }
 
@@ -150,7 +156,7 @@ struct MechanicsTheorems : Statements {
     state("φ of a subgraph is a block of φ", C.phi + C.phi * X * C.phi, phi, no_hypothesis, "a way leads over the cut once");
     shown("φ_c + φ_c(E - E_c)φ_c = φ", "\\phi_c + \\phi_c(\\mathcal{E}-\\mathcal{E}_c)\\phi_c = \\phi");
     state("ψ of the whole by its parts", C.psi + C.psi * (E_psi - C.E_psi) * psi, psi, no_hypothesis, "resolvents of E_ψ and E_ψc");
-    shown("ψ_c + ψ_c(E_ψ - E_ψc)ψ = ψ", "\\psi_c + \\psi_c(\\mathcal{E}_\\psi-\\mathcal{E}_{\\psi c})\\psi = \\psi");
+    shown("ψ_c + ψ_c(E_ψ - E_ψ_c)ψ = ψ", "\\psi_c + \\psi_c(\\mathcal{E}_\\psi-\\mathcal{E}_{\\psi_c})\\psi = \\psi");
     state("mass matrix of the whole by its parts", H * (I + C.phi * X) * C.phi * M * C.phi.T() * (I + X.T() * C.phi.T()) * H.T(), MM, no_hypothesis,
           "a way leads over the cut once");
     shown("H(I + φ_cX)φ_cMφ_c*(I + X*φ_c*)H* = ℳ,  X = E - E_c", "H(I+\\phi_cX)\\phi_cM\\phi_c^*(I+X^*\\phi_c^*)H^* = \\mathcal{M},\\quad X=\\mathcal{E}-\\mathcal{E}_c");
@@ -177,11 +183,11 @@ struct MechanicsTheorems : Statements {
     const Expression root = rows(*turned, turned->forces(), 0), here = rows(*robot, robot->motions(), last), old = rows(*robot, robot->motions(), 0);
     const Expression root_there = rows(*turned, turned->motions(), 0), old_there = rows(*turned, turned->motions(), first);
     state("articulated inertia with a body for root", root * W.P * root.T() * here * Upsilon * here.T(), I, free_root | no_hinge_diagonal, "soa.md #58");
-    shown("P_r(k) Υ(k) = I,  k the root of P_r", "\\mathcal{P}_r(k)\\,\\Upsilon(k) = I,\\quad k\\text{ the root of }\\mathcal{P}_r");
+    shown("P_n(k)Υ(k) = I, k the last body", "\\mathcal{P}_n(k)\\,\\Upsilon(k) = I,\\quad k\\text{ the last body}");
     state("compliance between two bodies knows no root", root_there * W.Omega * old_there.T(), here * Omega * old.T(), free_root | no_hinge_diagonal, "Ω = φ*H*ℳ⁻¹Hφ");
-    shown("Ω_r(k,0) = Ω(k,0)", "\\Omega_r(k,0) = \\Omega(k,0)");
+    shown("Ω_n(k,r) = Ω(k,r), k the last body, r a root", "\\Omega_n(k,r) = \\Omega(k,r),\\quad k\\text{ the last body},\\ r\\text{ a root}");
     state("ln det ℳ knows no root", logdet(W.H * W.phi * W.M * W.phi.T() * W.H.T()), logdet(MM), free_root | no_hinge_diagonal, "the map of velocities has determinant 1");
-    shown("ln det ℳ_r = ln det ℳ", "\\ln\\det\\mathcal{M}_r = \\ln\\det\\mathcal{M}");
+    shown("ln det ℳ_n = ln det ℳ", "\\ln\\det\\mathcal{M}_n = \\ln\\det\\mathcal{M}");
   }
 
   void waiting() {

@@ -1,1 +1,1 @@
-"""What accuracy costs: certificates of values, the accuracy table of a model, work and precision of integration."""
+"""Cost of accuracy: certificates of values, the accuracy table of a model, work and precision of integration."""

@@ -1,4 +1,4 @@
-"""Arguments of measurements, checked once, before anything is measured: every error names the argument and what there is."""
+"""Arguments of measurements, checked once before measuring: every error names the argument and the valid values."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ METHODS = ("articulated", *OTHER_METHODS)
 
 
 def checked_model(model: Any, caller: str) -> None:
-    """TypeError for what is no model; ModelError for one without coordinates, where nothing moves."""
+    """Check a model. Raises TypeError for other objects; ModelError for a model without coordinates."""
     if not isinstance(model, _core.Multibody):
         what = f"{model!r}" if isinstance(model, str) else f"an object of type {type(model).__name__}"
         takes = "takes a model: pc.load(path) of a file, or a robot such as pc.robots.panda()"
-        raise TypeError(f"{caller} {takes}; {what} is none")
+        raise TypeError(f"{caller} {takes}; got {what}")
     if not model.nv:
         raise _core.ModelError(f"{model.name!r} has no coordinates: nothing to measure")
 
 
 def listed(given: Any, name: str, single: tuple[type, ...] = (str, int, float, np.number)) -> list[Any]:
-    """What is given as a list; a bare string or number is a list of one. EvaluationError for an empty list."""
+    """Return the argument as a list; a single string or number is a list of one. Raises EvaluationError for an empty list."""
     if isinstance(given, single):
         return [given]
     if not isinstance(given, Iterable):
-        raise _core.EvaluationError(f"{name}={given!r}: a list, or one of its entries")
+        raise _core.EvaluationError(f"{name}={given!r}: give a list or a single entry")
     found = list(given)
     if not found:
         raise _core.EvaluationError(f"{name} is empty: nothing to measure; leave it out for the defaults")
@@ -36,7 +36,7 @@ def listed(given: Any, name: str, single: tuple[type, ...] = (str, int, float, n
 
 
 def checked_names(given: Any, name: str, what: str, known: Iterable[str]) -> list[str]:
-    """Names, each of what there is."""
+    """Return names, each checked."""
     found, known = listed(given, name), list(known)
     for one in found:
         if one not in known:
@@ -45,7 +45,7 @@ def checked_names(given: Any, name: str, what: str, known: Iterable[str]) -> lis
 
 
 def checked_precisions(given: Any) -> list[Any]:
-    """Precisions, each of what there is."""
+    """Return precisions, each checked."""
     found = listed(given, "precisions")
     for precision in found:
         if not isinstance(precision, (str, int)):
@@ -55,12 +55,12 @@ def checked_precisions(given: Any) -> list[Any]:
 
 
 def checked_refinements(given: Any) -> list[tuple[int | str, str]]:
-    """Pairs of refinement and residual; a bare number, "auto" or pair is a list of one."""
+    """Return pairs of refinement and residual; a single number, "auto" or pair is a list of one."""
     pair = isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str) and given[1] != "auto"
     found = []
     for one in [given] if pair else listed(given, "refinements"):
         if isinstance(one, (tuple, list)) and len(one) != 2:
-            raise _core.EvaluationError(f"refinements: {one!r} is neither a number of corrections nor a pair of it and a residual")
+            raise _core.EvaluationError(f"refinements: {one!r} is neither a number of corrections nor a pair of number and residual")
         refine, residual = one if isinstance(one, (tuple, list)) else (one, "same")
         if residual not in RESIDUALS:
             raise _core.EvaluationError(
@@ -71,7 +71,7 @@ def checked_refinements(given: Any) -> list[tuple[int | str, str]]:
 
 
 def checked_positive(given: Any, name: str, what: str) -> list[float]:
-    """Positive finite numbers."""
+    """Return positive finite numbers, checked."""
     found = listed(given, name)
     for one in found:
         if not isinstance(one, (int, float, np.number)) or not 0 < one < np.inf:
@@ -80,7 +80,7 @@ def checked_positive(given: Any, name: str, what: str) -> list[float]:
 
 
 def checked_seconds(seconds: Any) -> float:
-    """Time that a measurement may take: not negative, finite."""
+    """Return the time for a measurement, checked: finite, not negative."""
     if not isinstance(seconds, (int, float, np.number)) or not 0 <= seconds < np.inf:
-        raise _core.EvaluationError(f"seconds={seconds!r}: a finite number of seconds, zero or more")
+        raise _core.EvaluationError(f"seconds={seconds!r}: give a finite number of seconds, zero or more")
     return float(seconds)

@@ -11,17 +11,17 @@ from .. import _core
 from .rungs import Rung, epsilon
 
 EXACT = "ud"
-"""The form that references are computed in: its error does not grow with the mass ratio."""
+"""The form for references: its error does not grow with the mass ratio."""
 
 BITS = 400
 """Working precision of the differences below, more than that of 100 digits."""
 
 
 def dynamics_expression(model: Any, tau: np.ndarray, v: np.ndarray) -> _core.Operator:
-    """Accelerations at velocities v as an expression, with gravity and Coriolis terms inside the sweeps.
+    """Return accelerations at velocities v as an expression, with gravity and Coriolis terms inside the sweeps.
 
-    θ̈ = [I - HψK]* D⁻¹ (T - Hψ(KT + P𝔞 + b)) - K*ψ*𝔞, 𝔞 = a + a₀ [Jain 2011, articulated-body forward dynamics]; T = τ less what
-    rotors of balls and free hinges take, v ×* (J v).
+    θ̈ = [I - HψK]* D⁻¹ (T - Hψ(KT + P𝔞 + b)) - K*ψ*𝔞, 𝔞 = a + a₀ [Jain 2011, articulated-body forward dynamics]; T = τ minus
+    the inertial forces of rotors on balls and free hinges, v ×* (J v).
     """
     soa = model.soa
     H, psi, K, D, P, I, a, b, a0 = soa("H psi K D P I a b gravity_base")
@@ -33,7 +33,7 @@ def dynamics_expression(model: Any, tau: np.ndarray, v: np.ndarray) -> _core.Ope
 
 
 def _rotor_forces(model: Any, v: np.ndarray) -> list[np.ndarray]:
-    """-v ×* (J v) of rotors on balls and free hinges: doubles (nv,), each of what the sum of those before has left."""
+    """Return -v ×* (J v) of rotors on balls and free hinges, as a sum of doubles (nv,), each the remainder of the former."""
     if not model.rotor_forces(v).any():
         return []
     parts: list[np.ndarray] = []
@@ -61,22 +61,22 @@ def _of_hinge(hinge: Any, v: np.ndarray) -> np.ndarray:
 
 
 def exact_dynamics(model: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray, precision: Any, form: str = EXACT) -> np.ndarray:
-    """Accelerations (nv,) as mpmath numbers in a wider precision, not rounded to double."""
+    """Return accelerations (nv,) as mpmath numbers in a wider precision, not rounded to double."""
     return dynamics_expression(model, tau, v).at(q, v, form=form, precision=precision).dense(dtype=object)[:, 0]
 
 
 def dynamics_error(model: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray, rung: Rung, returned: np.ndarray, truth: np.ndarray) -> float:
-    """Relative error of forward dynamics at one state, against the exact accelerations.
+    """Return the relative error of forward dynamics at one state, against the exact accelerations.
 
-    Of a precision wider than double the array that is returned shows its own rounding and no more. There, for the unrefined articulated
-    method, the error is the correction that a residual in the next wider precision makes, which is the error itself but for a relative
-    part of about its own size, in the largest norm. An error that the array shows to half its digits is measured on the array: where
-    little but rounding is left of the accelerations, that is any size.
+    In a precision wider than double, the returned array shows only its own rounding. There, for the unrefined articulated
+    method, the error is the correction by a residual in the next wider precision, which equals the error except for a relative
+    part of about its own size, in the largest norm. An error that the array shows to half its digits is measured on the array: if
+    the accelerations are mostly rounding, it may have any size.
     """
     if epsilon(rung.precision) < epsilon("double") and not rung.refine and rung.method == "articulated":
         try:
             run = model.refinement(q, v, tau, form=rung.form, refine=1, residual="wider", precision=rung.precision)
-        except _core.RefinementError:  # no digit is right, and a double can show that
+        except _core.RefinementError:  # no digit is correct, and a double shows that
             return relative_error(returned, truth)
         correction = float(run["corrections"][0])
         if correction < epsilon("double") ** 0.5:
@@ -85,13 +85,13 @@ def dynamics_error(model: Any, q: np.ndarray, v: np.ndarray, tau: np.ndarray, ru
 
 
 def magnitude(value: Any) -> float:
-    """2-norm (Frobenius of a matrix) of numbers that may be mpmath's."""
+    """Return the 2-norm (Frobenius for a matrix) of numbers, which may be mpmath's."""
     with mpmath.workprec(BITS):
         return float(mpmath.sqrt(mpmath.fsum(mpmath.mpf(x) ** 2 for x in np.asarray(value, dtype=object).ravel())))
 
 
 def relative_error(value: Any, exact: Any) -> float:
-    """2-norm of the difference over that of the exact value (Frobenius of a matrix); both may be mpmath numbers."""
+    """Return the 2-norm of the difference over the 2-norm of the exact value (Frobenius for a matrix); both may be mpmath numbers."""
     value, exact = np.asarray(value, dtype=object).ravel(), np.asarray(exact, dtype=object).ravel()
     with mpmath.workprec(BITS):
         exact = [mpmath.mpf(e) for e in exact]

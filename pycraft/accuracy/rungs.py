@@ -1,4 +1,4 @@
-"""Ways of computing, from cheap to accurate: form, refinement, precision and method, and the ladder that they make."""
+"""Ways of computing, from cheap to accurate: form, refinement, precision and method, and the ladder of rungs."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ FORMS = ("fast", "ud", "square-root")
 """Forms of the articulated-inertia sweep."""
 
 OTHER_METHODS = ("cholesky", "ldl", "conjugate-gradients", "inverse", "divide-and-conquer", "realization")
-"""Methods of forward dynamics beside the articulated-body algorithm; they have no forms."""
+"""Methods of forward dynamics other than the articulated-body algorithm; they have no forms."""
 
 REFERENCE = "quad"
-"""What values are measured against; what is as wide or wider is measured against the next wider precision."""
+"""Precision of the reference; values of this or a wider precision are measured against the next wider one."""
 
 
 RESIDUALS = ("same", "gather", "wider")
-"""What a residual of a refinement is formed in: the precision itself; that, but forces gathered one up; all one up."""
+"""Precision of the residual of a refinement: the precision itself; forces gathered in the next wider; all in the next wider."""
 
 RESIDUAL_TEXTS = {"same": "", "gather": ", wide gather", "wider": ", wider residual"}
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One way of computing: what `forward_dynamics`, `at` and the timings take as keywords."""
+    """One way of computing: the keywords of `forward_dynamics`, `at` and the timings."""
 
     form: str = "fast"
     refine: int | str = 0
@@ -55,7 +55,7 @@ class Rung:
 
     @property
     def label(self) -> str:
-        """The way, and the precision where it is not double: "ud, extended"."""
+        """The way, and the precision if it is not double: "ud, extended"."""
         return self.way + ("" if self.precision == "double" else f", {precision_name(self.precision)}")
 
 
@@ -67,13 +67,13 @@ LADDER = (
     Rung("fast", precision="extended"),
     Rung("fast", precision="quad"),
 )
-"""The ladder that users climb: each step costs more than the one before it."""
+"""The ladder for users: each step costs more than the one before it."""
 
 WIDE_GATHER = Rung("fast", refine=1, residual="gather")
 WIDER_RESIDUAL = Rung("fast", refine=1, residual="wider")
 
 CLIMB = (*LADDER[:2], WIDE_GATHER, *LADDER[2:4], WIDER_RESIDUAL, *LADDER[4:])
-"""The steps among which a certificate looks for the next one that helps: where forces cancel, a wider residual lowers the floor."""
+"""The steps among which a certificate searches for a better one: if forces cancel, a wider residual lowers the floor."""
 
 
 def precision_name(precision: Any) -> str:
@@ -83,7 +83,7 @@ def precision_name(precision: Any) -> str:
 
 
 def epsilon(precision: Any) -> float:
-    """Epsilon of a precision: the distance from one to the next number."""
+    """Return epsilon of a precision: the distance from one to the next number."""
     known = _core.epsilons()
     key = int(precision) if str(precision).isdigit() else precision
     if key not in known:
@@ -92,14 +92,14 @@ def epsilon(precision: Any) -> float:
 
 
 def wider(precision: Any) -> Any:
-    """The next wider precision, None above the widest."""
+    """Return the next wider precision, None above the widest."""
     return _core.wider(precision)
 
 
 def reference_of(precision: Any) -> Any:
-    """What values of this precision are measured against: quad, or the next one that is wider by a hundred; None above the widest.
+    """Return the reference precision for this precision: quad, or the next one that is wider by a factor of 100; None above the widest.
 
-    (Where long double has 113 bits, extended is as wide as quad.)
+    (If long double has 113 bits, extended is as wide as quad.)
     """
     reference = REFERENCE if epsilon(precision) > epsilon(REFERENCE) else wider(precision)
     while reference is not None and 100 * epsilon(reference) > epsilon(precision):
@@ -108,7 +108,7 @@ def reference_of(precision: Any) -> Any:
 
 
 def above(rung: Rung) -> list[Rung]:
-    """The steps above a way of computing, lowest first. Raises EvaluationError for a form that is not there."""
+    """Return the steps above a way of computing, lowest first. Raises EvaluationError for an unknown form."""
     check_form(rung.form)
     if epsilon(rung.precision) > epsilon("double"):
         return [replace(rung, precision="double"), *CLIMB[1:]]
@@ -126,13 +126,13 @@ def above(rung: Rung) -> list[Rung]:
             if rung.form != "fast"
             else list(CLIMB[CLIMB.index(WIDE_GATHER) + 1 :])
         )
-    # A root-free and a square-root sweep stand side by side; more than one step of refinement is still refinement.
+    # The root-free and the square-root sweep are equivalent rungs; more than one step of refinement is still refinement.
     form = "ud" if rung.form == "square-root" else rung.form
     return list(CLIMB[CLIMB.index(Rung(form, refine=1 if rung.refine else 0)) + 1 :])
 
 
 def check_form(form: Any) -> None:
-    """EvaluationError where there is no such form."""
+    """Raise EvaluationError for an unknown form."""
     if form not in FORMS:
         known = "'fast', 'ud' and 'square-root'"
         raise _core.EvaluationError(f"no form of the articulated-inertia sweep is called {form!r}; there are {known}")

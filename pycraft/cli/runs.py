@@ -48,7 +48,7 @@ def run(
     duration: Annotated[
         float | None, typer.Option("-T", "--duration", help="Seconds to simulate (default: the value in the scene's file).")
     ] = None,
-    integrator: Annotated[str | None, typer.Option(help="Integrator (default: the scene file's, else dopri5).")] = None,
+    integrator: Annotated[str | None, typer.Option(help="Integrator (default: the scene file's, else auto).")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of a step.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of a step.")] = None,
     step: Annotated[float | None, typer.Option(help="Seconds, for integrators with constant steps.")] = None,

@@ -89,7 +89,7 @@ def embedded_motion(
         raise _core.ModelError(f"a motion of {model.name!r} begins at one state, not at an array {q.shape}")
     times = np.array(_core.real_array(times, "times"), float)
     if times.ndim != 1 or not times.size or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
-        raise _core.EvaluationError("times: finite, increasing, at least one")
+        raise _core.EvaluationError("times must be finite and increasing, at least one")
     rtol, atol = one_number(rtol, "rtol"), one_number(atol, "atol")
     if not (_LEAST_RTOL <= rtol < np.inf and 0 < atol < np.inf):
         raise _core.EvaluationError(f"rtol={rtol}, atol={atol}: positive numbers, and rtol at least {_LEAST_RTOL:.2g}, what doubles have")

@@ -324,7 +324,7 @@ def _deviations(noise: Any, nv: int) -> np.ndarray | None:
         return None
     given = _core.real_array(noise, "noise")
     if given.ndim > 1 or given.size not in (1, nv) or not (np.isfinite(given) & (given > 0)).all():
-        raise _core.ModelError(f"noise: a positive standard deviation, or one for each of {nv} coordinates, not {noise!r:.80}")
+        raise _core.ModelError(f"noise must be a positive standard deviation, or one for each of {nv} coordinates, not {noise!r:.80}")
     return np.broadcast_to(given.ravel(), (nv,)).astype(float)
 
 

@@ -175,7 +175,7 @@ def _checked_times(times: Any) -> np.ndarray:
     """Return a copy of the times as an array (T,). EvaluationError if it is empty or has values that are not finite."""
     made = np.atleast_1d(np.array(_core.real_array(times, "times")))
     if made.ndim != 1 or not made.size:
-        raise _core.EvaluationError(f"times: a list of times in seconds, not an array of shape {made.shape}")
+        raise _core.EvaluationError(f"times must be a list of times in seconds, not an array of shape {made.shape}")
     if not np.isfinite(made).all():
         at = int(np.argmin(np.isfinite(made)))
         raise _core.EvaluationError(f"times: entry {at} is {made[at]:g}; times are finite numbers of seconds")

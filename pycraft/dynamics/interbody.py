@@ -186,7 +186,7 @@ def pushed(wrenches: Mapping[Any, Any] | None, wrench_axes: str) -> tuple[list[s
     if wrenches is None:
         wrenches = {}
     if not isinstance(wrenches, Mapping):
-        raise _core.ModelError(f"wrenches: a dictionary of wrenches (6,) by the names of bodies or nodes, not {wrenches!r:.80}")
+        raise _core.ModelError(f"wrenches must be a dictionary of wrenches (6,) by the names of bodies or nodes, not {wrenches!r:.80}")
     names, each = [], []
     for of, given in wrenches.items():
         names.append(text(getattr(of, "name", of), "a body or node of wrenches"))
@@ -306,7 +306,7 @@ def in_axes(model: Any, q: Any, f: np.ndarray, X: np.ndarray, axes: Any, about: 
         else:
             point = np.asarray(_core.real_array(about, "about"), float)
             if point.shape != (3,) or not np.isfinite(point).all():
-                raise _core.ModelError(f"about: a frame, or three finite numbers in the world's axes, not {about!r:.80}")
+                raise _core.ModelError(f"about must be a frame, or three finite numbers in the world's axes, not {about!r:.80}")
     with np.errstate(over="ignore", invalid="ignore"):
         moment = moment + np.cross(p - point, force)
         made = np.concatenate([np.einsum("...ji,...j->...i", turn, moment), np.einsum("...ji,...j->...i", turn, force)], axis=-1)

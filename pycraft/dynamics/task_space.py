@@ -425,11 +425,13 @@ def _rows(frame: str, directions: Any) -> tuple[np.ndarray, list[str]]:
     if all(isinstance(one, str) for one in named):
         unknown = [one for one in named if one not in TWIST]
         if unknown or not named or len(set(named)) < len(named):
-            raise _core.ModelError(f"directions of {frame!r}: different ones of {', '.join(TWIST)}, or rows (k, 6); not {named!r:.80}")
+            raise _core.ModelError(
+                f"directions of {frame!r} must be different ones of {', '.join(TWIST)}, or rows (k, 6); not {named!r:.80}"
+            )
         return np.eye(6)[[TWIST.index(one) for one in named]], [f"{frame}.{one}" for one in named]
     rows = np.atleast_2d(_core.real_array(directions, f"directions of {frame!r}"))
     if rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
-        raise _core.ModelError(f"directions of {frame!r}: rows (k, 6), not {np.shape(directions)}")
+        raise _core.ModelError(f"directions of {frame!r} must be rows (k, 6), not {np.shape(directions)}")
     if not np.isfinite(rows).all():
         raise _core.ModelError(f"directions of {frame!r}: row {int(np.argwhere(~np.isfinite(rows))[0, 0])} is not finite")
     if np.linalg.matrix_rank(rows) < len(rows):

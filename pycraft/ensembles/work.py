@@ -25,7 +25,7 @@ Values = Mapping[str, Any]
 Rows = Sequence[tuple[int, Values]]
 
 DEFAULTS: dict[str, Any] = {
-    "integrator": "dopri5", "rtol": 1e-9, "atol": 1e-12, "step": None, "max_step": None, "normalise": "never", "energy": True,
+    "integrator": "auto", "rtol": 1e-9, "atol": 1e-12, "step": None, "max_step": None, "normalise": "never", "energy": True,
 }  # fmt: skip
 """Of `Scene.simulate`."""
 PACKS = 32

@@ -1,4 +1,4 @@
-"""Theorems: the checker, a user's own statements, the search for counterexamples, reports. The theorems themselves are the core's."""
+"""Theorems: the checker, a user's own statements, the search for counterexamples, reports. The theorems are defined in the core."""
 
 from .checker import check, check_model
 from .judge import UndecidedError

@@ -1,4 +1,4 @@
-"""The nodes that B, 𝒥 and Λ are of where a statement names none: it is said of any."""
+"""Nodes of B, 𝒥 and Λ in a statement that names none and so applies to any."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def any_nodes(operators: Any) -> list[str]:
-    """A node on the body with the most coordinates between it and the base, or that body's own frame: there Λ exists, if anywhere.
+    """Return a node on the body with the most coordinates between it and the base, or that body's own frame: there Λ exists, if anywhere.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`check` of a statement by block: for every choice of bodies that is meant, on a model or on random trees."""
+"""`check` of a statement by block: for every choice of bodies that satisfies its relations, on a model or on random trees."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from .statement_text import telling
 from .vocabulary import ParseError
 
 WORST = 8
-"""In wider scalars these choices of bodies are looked at first: if the statement fails for one of them, it fails."""
+"""Number of the worst choices of bodies, which are evaluated first in wider scalars: if one fails, the statement fails."""
 _DIGITS = 120
-"""Of the operations on blocks of wide numbers: more than the numbers have."""
+"""Digits of the operations on blocks of wide numbers: more than the numbers have."""
 
 
 @dataclass
@@ -44,7 +44,7 @@ class BlockRefutation:
 
 @dataclass
 class _OnModel:
-    """What was found on one model."""
+    """Findings on one model."""
 
     verdict: Verdict = field(default_factory=Verdict)
     counted: int = 0
@@ -54,7 +54,7 @@ class _OnModel:
 
 
 def check_by_block(text: str, given: OperatorSet | None, *, states: int, seed: int, precision: str | int) -> CheckReport:
-    """The report of a statement by block on these operators, or on random trees; see `pycraft.check`."""
+    """Return the report of a statement by block on these operators, or on random trees; see `pycraft.check`."""
     found: dict[str, tuple[Spec | None, Any, _OnModel]] = {}
     if given is not None:
         own = given._model
@@ -72,7 +72,7 @@ def check_by_block(text: str, given: OperatorSet | None, *, states: int, seed: i
     if not said:
         where = "the random trees" if given is None else "the model"
         chains = "; k+1 and k-1 are bodies of serial chains: write ℘(k) and Σ_{j∈C(k)} for a tree" if read.of_chains else ""
-        raise _core.EvaluationError(f"{text!r}: no bodies are as it says on {where}{chains}")
+        raise _core.EvaluationError(f"{text!r}: no bodies on {where} satisfy its relations{chains}")
     whole = Verdict([j for _, _, on in said.values() for j in on.verdict.judgements])
     report = CheckReport.of(text, whole, [*said], read.understood)
     count = sum(on.counted for _, _, on in said.values())
@@ -87,7 +87,7 @@ def _names(operators: Any) -> list[str]:
 
 
 def _on_model(read: BlockStatement, operators: Any, states: list[Any], precision: str | int) -> _OnModel:
-    """The statement on one model, at these states."""
+    """Check the statement on one model, at these states."""
     found = _OnModel()
     parents, names = operators._source.parents, _names(operators)
     fixed = {name: body for name, _, body in operators.V.blocks}
@@ -123,7 +123,7 @@ def _on_model(read: BlockStatement, operators: Any, states: list[Any], precision
 def _judged(
     read: BlockStatement, operators: Any, at: BoundState, chosen: list[dict[str, int]], precision: str | int
 ) -> tuple[Judgement, list[float]]:
-    """(the verdict at a state, by how much each choice of bodies is off in the second scalar, 0 for what may be rounding)."""
+    """Return the verdict at a state, and the error of each choice of bodies in the second scalar, 0 for possible rounding."""
     found = Judgement(state=at.state)
     apart: list[float] = []
     among = list(range(len(chosen)))
@@ -131,7 +131,7 @@ def _judged(
     for step, name in enumerate(ladder(precision)):
         blocks = Blocks(at, operators, name, read.definitions)
         with mpmath.workdps(_DIGITS):
-            if step == 2 and any(apart):  # where it is false, some bodies are enough
+            if step == 2 and any(apart):  # if it is false, some bodies suffice
                 among = sorted(among, key=lambda i: -apart[i])[:WORST]
             both = [_both(read, blocks, chosen[i]) for i in among]
         scale = max((size for _, _, size in both), default=0.0)
@@ -152,7 +152,7 @@ def _judged(
 
 
 def _both(read: BlockStatement, blocks: Blocks, bodies: dict[str, int]) -> tuple[float, float, float]:
-    """(the largest entry of lhs - rhs, the bound on it, the largest entry of both)."""
+    """Return the largest entry of lhs - rhs, its bound, and the largest entry of both."""
     left, right = (value(side, blocks, bodies) for side in read.formula)
     places = [(x.codomain, x.domain) for x in (left, right)]
     zero = [x.array.ndim == 0 and not x.array for x in (left, right)]
@@ -173,7 +173,7 @@ def _largest(array: Any) -> float:
 
 
 def _explain(report: CheckReport, read: BlockStatement, said: dict[str, Any]) -> None:
-    """The smallest model that refutes it, of those tried; hypotheses, and relations of the bodies, under which it was true on all."""
+    """Add the smallest refuting model tried, and the hypotheses and relations of bodies under which it was true on all models."""
     refuted = [(entry[0], name, entry[1], entry[2].refutation) for name, entry in said.items() if entry[2].refutation is not None]
     spec, name, operators, (state, bodies, residual) = min(refuted, key=lambda r: r[0].size if r[0] is not None else (0, 0))
     names = _names(operators)
@@ -187,7 +187,7 @@ def _explain(report: CheckReport, read: BlockStatement, said: dict[str, Any]) ->
 
 
 def _saving(found: list[tuple[frozenset[str], bool]]) -> list[frozenset[str]]:
-    """The fewest hypotheses with which it held on every model, of two at least."""
+    """Return the fewest hypotheses under which it held on every model, of at least two."""
     for size in range(1, len(HYPOTHESES)):
         sets = [frozenset(h) for h in itertools.combinations(HYPOTHESES, size)]
         held = [h for h in sets if len(m := [holds for met, holds in found if h <= met]) > 1 and all(m)]
@@ -197,7 +197,7 @@ def _saving(found: list[tuple[frozenset[str], bool]]) -> list[frozenset[str]]:
 
 
 def _saves(relation: Relation, said: dict[str, Any]) -> bool:
-    """Whether no choice of bodies of which it holds was off, and some were right; it must leave some out."""
+    """Return True if all choices of bodies that satisfy the relation were right, some exist, and others fail the relation."""
     on = [(entry[1]._source.parents, entry[2]) for entry in said.values()]
     if any(relation.holds(parents, bodies) for parents, found in on for bodies in found.bad):
         return False

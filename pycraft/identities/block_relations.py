@@ -48,6 +48,8 @@ _TESTS: dict[str, Test] = {
     "{} is the parent of {}": lambda parents, b: parents[b[1]] == b[0],
     "{} is a child of {}": lambda parents, b: parents[b[0]] == b[1],
     "{} is the closest common ancestor of {} and {}": _closest,
+    "{} is a root": lambda parents, b: parents[b[0]] < 0,
+    "{} is the last body": lambda parents, b: b[0] == len(parents) - 1,
 }
 
 
@@ -87,6 +89,8 @@ _PHRASES = [
     (rf"{_X}\s*=\s*[𝒫℘P]\s*\(\s*{_X}\s*\)", "{} is the parent of {}"),
     (rf"{_X}\s*(?:is|∈|in)?\s*(?:a\s+)?child(?:ren)?\s*(?:of\s*)?\(?\s*{_X}\s*\)?", "{} is a child of {}"),
     (rf"{_X}\s*∈\s*[C𝒞]\s*\(\s*{_X}\s*\)", "{} is a child of {}"),
+    (rf"{_X}{_IS}(?:a|the)?\s*root(?:\s+body)?(?!\w)", "{} is a root"),
+    (rf"{_X}{_IS}(?:the\s+)?last\s+body(?!\w)", "{} is the last body"),
     (rf"{_X}\s*(?:≠|!=)\s*{_X}", "{} ≠ {}"),
     (rf"{_X}\s*=\s*{_X}", "{} = {}"),
 ]
@@ -100,9 +104,13 @@ def _patterns() -> list[tuple[re.Pattern[str], str]]:
 _BETWEEN = re.compile(rf"\s*(?:,|;|and\b|where\b|for\b|if\b|with\b|(?:all|every|any)\s+{_X}(?:\s*,\s*{_X})*|$)\s*")
 
 
+_WORDS_IN_LATEX = re.compile(r"\\(?:text|mathrm|textrm)\s*\{([^{}]*)\}|\\q?quad(?![A-Za-z])|\\[,;: ]")
+
+
 def relations(text: str, letters: Sequence[str], begin: int = 0) -> Iterator[Relation]:
     """What is said behind a statement, which begins at a character of the typed text. Raises Misread."""
     at = 0
+    text = _WORDS_IN_LATEX.sub(lambda m: (" " * m[0].index(m[1]) + m[1]).ljust(len(m[0])) if m[1] else " " * len(m[0]), text)
     while text[at:].strip():
         for pattern, says in _patterns():
             found = pattern.match(text, at)

@@ -15,9 +15,10 @@ import mpmath
 import numpy as np
 
 from .. import _core
-from .block_reading import SumOver, shown
+from .block_reading import Entry, SumOver, shown
 from .block_relations import ancestors
 from .definitions import Definition, drawn
+from .extended_numbers import as_extended
 from .formula import Call, Letter, Node, Number, Power, Product, Star, Sum
 from .judge import BoundState
 from .parse import Statements
@@ -71,7 +72,7 @@ class Blocks:
             else:
                 array = np.asarray(bound.dense(dtype=object))
                 if self.precision == "extended":
-                    array = _as_extended(array)
+                    array = as_extended(array)
             zero = _core.zero(operator.domain, operator.codomain)
             roundings = Roundings(operator, zero, self._at.sizes("double", {}))
             self.growth = max(self.growth, roundings.growth)
@@ -96,7 +97,7 @@ class Blocks:
         if not arguments:
             return Block(array, (operator.codomain.name, ""), None if vector else (operator.domain.name, ""), error)
         if len(arguments) == 1 and not vector and operator.domain.name == "Θ" and not operator.is_block_diagonal:
-            rows = _part(operator.codomain, self._body(arguments[0], bodies), letter)  # J(k): how body k moves with all hinges
+            rows = self._part(operator.codomain, self._body(arguments[0], bodies), letter)  # J(k): how body k moves with all hinges
             return Block(array[rows], (operator.codomain.name, arguments[0]), (operator.domain.name, ""), error)
         if len(arguments) == 1 and not vector:
             if not operator.is_block_diagonal:
@@ -104,11 +105,34 @@ class Blocks:
             arguments = arguments * 2
         if len(arguments) != (1 if vector else 2):
             raise ParseError(f"{shown(letter)}: blocks have {'one body' if vector else 'one body or two'}")
-        rows = _part(operator.codomain, self._body(arguments[0], bodies), letter)
+        rows = self._part(operator.codomain, self._body(arguments[0], bodies), letter)
         if vector:
             return Block(array[rows], (operator.codomain.name, arguments[0]), ("R^1", ""), error)
-        columns = _part(operator.domain, self._body(arguments[1], bodies), letter)
+        columns = self._part(operator.domain, self._body(arguments[1], bodies), letter)
         return Block(array[rows, columns], (operator.codomain.name, arguments[0]), (operator.domain.name, arguments[1]), error)
+
+    def entry(self, node: Entry, whole: Block, bodies: dict[str, int]) -> Block:
+        """A block of an expression whose value is known; raises ParseError where it has none."""
+        spaces = {space.name: space for space in (self._operators.Theta, self._operators.V, self._operators.F)}
+        ends = (whole.codomain, whole.domain)
+        if len(node.arguments) != 2 or any(end is None or end[0] not in spaces or end[1] for end in ends):
+            raise ParseError(f"{shown(node)}: of an expression that leads between all bodies, or hinges, a block has two bodies")
+        rows, columns = (
+            self._part(spaces[end[0]], self._body(body, bodies), node)
+            for end, body in zip(ends, node.arguments, strict=True)
+            if end is not None
+        )
+        places = [(end[0], body) for end, body in zip(ends, node.arguments, strict=True) if end is not None]
+        return Block(whole.array[rows, columns], places[0], places[1], whole.error)
+
+    def _part(self, space: Any, body: int, node: Node) -> slice:
+        """Where a body's numbers are; trees that are made of the model's know its bodies by their names."""
+        own = space in (self._operators.Theta, self._operators.V, self._operators.F)
+        name = next((n for n, _, k in self._operators.V.blocks if k == body), None)
+        found = next((where for n, where, k in space.blocks if (k == body if own else n == name)), None)
+        if found is None:
+            raise ParseError(f"{shown(node)}: {space.name} is not cut into bodies")
+        return found
 
     def _body(self, argument: str, bodies: dict[str, int]) -> int:
         if argument.startswith("parent("):
@@ -116,13 +140,6 @@ class Blocks:
         if argument.startswith("child("):
             return list(self.parents).index(bodies[argument[len("child(") : -1]])
         return bodies[argument]
-
-
-def _part(space: Any, body: int, letter: Letter) -> slice:
-    found = next((where for _, where, k in space.blocks if k == body), None)
-    if found is None:
-        raise ParseError(f"{shown(letter)}: {space.name} is not cut into bodies")
-    return found
 
 
 _AMONG: dict[str, Callable[[Sequence[int], int], list[int]]] = {
@@ -161,10 +178,12 @@ def value(node: Node, blocks: Blocks, bodies: dict[str, int]) -> Block:
             return blocks.of(node, bodies)
         case Number(value=number):
             made = np.asarray(mpmath.mpf(number.numerator) / number.denominator if blocks.precision != "double" else float(number))
-            return Block(_as_extended(made) if blocks.precision == "extended" else made, None, None, eps * abs(float(number)))
+            return Block(as_extended(made) if blocks.precision == "extended" else made, None, None, eps * abs(float(number)))
         case Star(inner=inner):
             x = value(inner, blocks, bodies)
             return x if x.domain is None else Block(x.array.T, _dual(x.domain), _dual(x.codomain), x.error)
+        case Entry(inner=inner):
+            return blocks.entry(node, value(inner, blocks, bodies), bodies)
         case SumOver(index=index, of=of, inner=inner, among=among, multiplied=multiplied):
             over = _AMONG[among](blocks.parents, bodies[of]) if of else range(len(blocks.parents))
             values = [value(inner, blocks, {**bodies, index: k}) for k in over]
@@ -291,10 +310,3 @@ def _norm(array: Any) -> float:
     if array.dtype == object:
         array = array.astype(float)
     return float(np.sqrt((array * array).sum()))
-
-
-def _as_extended(array: Any) -> Any:
-    """mpmath numbers as long doubles: each the sum of a double and the rest."""
-    high = np.asarray(array, float)
-    low = np.asarray(array - high, float)
-    return high.astype(np.longdouble) + low.astype(np.longdouble)

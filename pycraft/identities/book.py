@@ -39,7 +39,7 @@ atom: NAME -> name
     | "(" sum ")" -> group
     | "[" sum "]" -> group
     | "{" sum "}" -> group
-DERIVATIVE: /∂(_[ijt])?/
+DERIVATIVE: /∂(_(mass|[ijtxyz]))?/
 PLUS: "+"
 MINUS: "-"
 _TIMES: "@" | "·"

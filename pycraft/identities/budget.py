@@ -1,4 +1,4 @@
-"""How long a search may take, in CPU seconds: the same amount of work on a loaded machine, where the clock on the wall runs ahead."""
+"""Time limit of a search in CPU seconds, so that it does the same work on a loaded machine."""
 
 from __future__ import annotations
 

@@ -16,7 +16,9 @@ from .block_check import check_by_block
 from .block_reading import says_by_block
 from .dialects import in_dialect
 from .drawn_vectors import drawn_vectors
+from .inequalities import judge_read
 from .judge import FAILS, BoundState, Verdict, judge_states, ladder
+from .on_loops import judged_on_loops, on_loops, said_of_loops
 from .parse import Statement, Statements, check_has_space
 from .report import UNDEFINED, CheckReport, Finding, Report
 from .statement_text import statement_text, telling_of
@@ -194,9 +196,12 @@ def check(
     if model is None:
         if not isinstance(statement, str):
             raise _core.EvaluationError("expressions belong to one model: give text to check a statement on random trees")
+        if said_of_loops(text):
+            return _check_on_loops(text, states, seed, precision)
         return _check_on_trees(text, states=states, seed=seed, search=search, precision=precision, budget=budget)
     if isinstance(statement, str):
-        read = Statements(operators).read(statement)
+        operators = on_loops(operators, statement)
+        read = Statements(operators).read(statement, inequalities=True)
         if read.rhs is None:
             raise _core.EvaluationError(f"{statement!r} has one side; a statement is lhs == rhs")
     else:
@@ -259,6 +264,16 @@ def _check_on_trees(text: str, *, states: int, seed: int, search: bool, precisio
     return report
 
 
+def _check_on_loops(text: str, states: int, seed: int, precision: str | int) -> CheckReport:
+    """A statement about embedded loops, or rows of loops, on random models whose loops are closed."""
+    found = list(judged_on_loops(text, states, seed, precision))
+    whole, names = Verdict([judgement for _, judgement, _ in found]), [name for name, *_ in found]
+    report = CheckReport.of(text, whole, [*dict.fromkeys(names)], found[0][2])
+    if report.verdict == FAILS:
+        report.notes.append(f"first refuted on {next(n for n, j in zip(names, whole.judgements, strict=True) if j.verdict == FAILS)}")
+    return report
+
+
 def _explain(report: CheckReport, text: str, **options: Any) -> None:
     """Under which hypotheses a false statement is true, and its most telling counterexample; nothing if it is of one model only."""
     from .truth import explained, saving
@@ -287,4 +302,5 @@ def run(read: Statement, operators: Any, states: int, seed: int, precision: str 
     rng = np.random.default_rng(seed)
     drawn = [BoundState(operators, s) for s in ([None] if model is None else [operators.random_state(rng) for _ in range(states)])]
     vectors = [drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {})) for _ in drawn]
-    return judge_states(read.lhs, read.rhs, drawn, vectors, precisions=ladder(precision), decides=telling_of(read))
+    options: dict[str, Any] = dict(precisions=ladder(precision), decides=telling_of(read))
+    return Verdict([judge_read(read, at, values, **options) for at, values in zip(drawn, vectors, strict=True)])

@@ -1,8 +1,8 @@
 """Letters of one's own around a statement: `x ∈ Θ; A := I + HφK; statement`, or behind it: `statement, where ν = D⁻¹ε`.
 
-A definition is `name := expression`, `name ∈ Θ` for a vector of which nothing else is known, or `name : Θ → V` for such an operator. Names
-are letters of any alphabet, with subscripts and accents. They hold for the statement and for the definitions that follow; of those behind
-it each holds for the ones before it, as one says them: ν = D⁻¹(T - Hz), z = ψ(KT + Pa + b).
+A definition is `name := expression`, `name ∈ Θ` for a vector of which nothing else is known, or `name : Θ → V` for such an operator; W is
+the space between M^½ and M^½*. Names are letters of any alphabet, with subscripts and accents. They hold for the statement and for the
+definitions that follow; of those behind it each holds for the ones before it, as one says them: ν = D⁻¹(T - Hz), z = ψ(KT + Pa + b).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .standard_letters import STANDARD
 from .vocabulary import ParseError, is_known
 
 _SPACE = r"Θ|Theta|\\Theta|\\mathcal\s*\{?\s*V\s*\}?|𝒱|V|F|R\^?\d*"
-_MAP = re.compile(rf"({_SPACE})\s*(?:→|->|\\to|\\rightarrow)\s*({_SPACE})$")
+_MAP = re.compile(rf"({_SPACE}|W)\s*(?:→|->|\\to|\\rightarrow)\s*({_SPACE}|W)$")
 _VECTOR = re.compile(rf"({_SPACE})$")
 _SIGNS = (":=", "≜", "≝", "\\triangleq", "\\coloneqq", "∈", "\\in ", " in ", ":")
 _BEHIND = re.compile(r"(?:\b(?:where|with|and)\b|(?<!\\)[,;]|\\q?quad(?![A-Za-z])|\\text\s*\{\s*(?:where|with|and)\s*\}|\s)*")
@@ -105,7 +105,7 @@ def parted(text: str, is_by_block: Callable[[str, Iterable[str]], bool] | None =
         return found + [d for d in reversed(behind) if d is not None], before[0].strip()
     claim = ";".join([*before, claim])
     first, *rest = pieces(re.sub(r"(?<![\w\\])(?:where|with)(?!\w)|\\text\s*\{\s*(?:where|with)\s*\}", ",", claim), ",")
-    made_behind = [_behind(part, (":=",) if by_block else (":=", "=")) for part in rest]
+    made_behind = [_behind(part, (":=",) if by_block else (":=", "=", ":", "∈")) for part in rest]
     found += [d for d in reversed(made_behind) if d is not None] if by_block or None not in made_behind else []
     if by_block:
         relations = [part for part, d in zip(rest, made_behind, strict=True) if d is None]
@@ -119,7 +119,8 @@ def _behind(part: str, signs: Iterable[str]) -> Definition | None:
     part = part[begin.end() if begin else 0 :]
     for sign in signs:
         name, found, what = part.partition(sign)
-        if found and what.strip() and "=" not in what and is_letter(name):
+        of_spaces = sign not in (":", "∈") or _MAP.match(what.strip()) or _VECTOR.match(what.strip())
+        if found and what.strip() and "=" not in what and of_spaces and is_letter(name):
             return Definition(letter_name(name), what.strip(), f"{name.strip()} := {what.strip()}")
     return None
 
@@ -169,4 +170,6 @@ def _space(name: str, operators: Any) -> Any:
     name = re.sub(r"\\mathcal|[\s{}\\]", "", name).replace("𝒱", "V")
     if name.startswith("R"):
         return _core.euclidean(int(name.removeprefix("R").removeprefix("^") or 1))
+    if name == "W":
+        return operators.M.sqrt().domain
     return operators.Theta if name in ("Θ", "Theta") else getattr(operators, name)

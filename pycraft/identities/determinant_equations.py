@@ -11,7 +11,7 @@ _DET = re.compile(r"(?<![A-Za-z_])det(?![A-Za-z_])")
 
 
 def as_logarithms(source: str) -> str:
-    """The text with products of determinants as sums of logarithms; any other text as it is."""
+    """Return the text with products of determinants as sums of logarithms; any other text unchanged."""
     if not _DET.search(source):
         return source
     sides = re.split(r"==?", source)
@@ -20,7 +20,7 @@ def as_logarithms(source: str) -> str:
 
 
 def _logarithm(side: str) -> str | None:
-    """ln|side|, of 1 and of products and quotients of determinants; None of anything else."""
+    """Return ln|side| for 1 and for products and quotients of determinants; None for anything else."""
     if side.strip() == "1":
         return "0"
     terms: list[str] = []
@@ -40,7 +40,7 @@ def _logarithm(side: str) -> str | None:
 
 
 def _operand(text: str) -> str | None:
-    """What a determinant is of: a bracket, or factors up to the next determinant; None where a sum stands outside of brackets."""
+    """Return the operand of a determinant: a bracket, or factors up to the next determinant; None for a sum outside brackets."""
     depth = 0
     for i, c in enumerate(text):
         depth += (c in "([{") - (c in ")]}")

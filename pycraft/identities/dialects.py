@@ -1,15 +1,15 @@
-r"""Letters of other schools: `dialect Park; M = S^T G^T J G S`, or `pycraft.check(statement, dialect="Park")`.
+r"""Notations of other authors: `dialect Park; M = S^T G^T J G S`, or `pycraft.check(statement, dialect="Park")`.
 
 A dialect is a table of definitions in the book's letters, a TOML file in `schools/`:
 
-    about = "who writes so"
-    subscripts = "v S I"            letters whose subscript is a body: v_i is v(i), v_{\lambda(i)} that of the parent
+    about = "who uses it"
+    subscripts = "v S I"            letters whose subscript is a body: v_i is v(i), v_{\lambda(i)} the parent's
     [letters]
     S = "H^*"                       a list where a letter has several meanings, of which the spaces choose
     [spellings]
-    '\mathrm{ad}_{S\dot q}' = "ad_Sq"    what no rule of letters, subscripts and accents reads
+    '\mathrm{ad}_{S\dot q}' = "ad_Sq"    spellings that no rule of letters, subscripts and accents reads
 
-Letters that a dialect has not are the book's.
+Letters that a dialect does not define have the book's meaning.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _DOWN = r"(?:\\mathrm\s*\{\s*([A-Za-z])\s*\}|([A-Za-z]))"
 
 @dataclass(frozen=True)
 class Dialect:
-    """The letters of a school."""
+    """The letters of one notation."""
 
     name: str
     about: str
@@ -41,7 +41,7 @@ class Dialect:
 
 @lru_cache(maxsize=1)
 def dialects() -> dict[str, Dialect]:
-    """All dialects by name."""
+    """Return all dialects by name."""
     found = [path for path in files(__package__).joinpath("schools").iterdir() if path.name.endswith(".toml")]
     return {path.name.removesuffix(".toml"): _read(path.name.removesuffix(".toml"), path.read_text(encoding="utf-8")) for path in found}
 
@@ -68,7 +68,7 @@ def _tokens(typed: str) -> list[str]:
 
 
 def _subscripted(letters: list[str]) -> list[tuple[re.Pattern[str], str]]:
-    """Letters with bodies for subscripts as letters of bodies: v_i, I_i^A, v_{λ(i)}, and the transforms between a body and its parent."""
+    """Return letters with bodies as subscripts, v_i, I_i^A, v_{λ(i)}, as letters of bodies, and the transforms of a body to its parent."""
     if not letters:
         return []
     dotted = "|".join(re.escape(x) for x in sorted(letters, key=len, reverse=True))
@@ -83,7 +83,7 @@ def _subscripted(letters: list[str]) -> list[tuple[re.Pattern[str], str]]:
 
 
 def in_dialect(text: str, dialect: str | None) -> str:
-    """A statement as text that says in which letters it is written."""
+    """Return a statement as text that names its dialect."""
     if dialect is None:
         return text
     _named(dialect)
@@ -91,7 +91,7 @@ def in_dialect(text: str, dialect: str | None) -> str:
 
 
 def of_dialect(text: str) -> tuple[Dialect | None, str]:
-    """(the dialect in which a text says that it is written, the rest, in spellings that are known); raises ParseError."""
+    """Return the dialect named in a text, and the rest in known spellings. Raises ParseError."""
     said = _DIRECTIVE.match(text)
     if said is None:
         return None, text
@@ -100,7 +100,7 @@ def of_dialect(text: str) -> tuple[Dialect | None, str]:
 
 
 def divided(text: str, is_by_block: Callable[[str, Iterable[str]], bool] | None = None) -> tuple[list[Definition], str]:
-    """`definitions.parted`, with the letters of the dialect in which a text says that it is written."""
+    """Return `definitions.parted`, with the letters of the dialect named in the text."""
     dialect, rest = of_dialect(text)
     own = [d.name for d in dialect.definitions] if dialect is not None else []
     found, claim = parted(rest, None if is_by_block is None else lambda said, more: is_by_block(said, [*own, *more]))

@@ -1,4 +1,4 @@
-"""Random values for the named vectors that statements speak of."""
+"""Random values for the named vectors in statements."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .. import _core
 
 
 def drawn_vectors(side: Any, rng: np.random.Generator, known: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Random values for the named vectors of an expression."""
+    """Return random values for the named vectors of an expression."""
     if isinstance(side, _core.Scalar):
         for operand in side.operands():
             drawn_vectors(operand, rng, known)

@@ -1,7 +1,7 @@
-"""Formulas one slip of the pen away: star, sign, tilde, letter, order, inverse, factor, number, term; with words for it.
+"""Formulas one slip of the pen away: star, sign, tilde, letter, order, inverse, factor, number, term; with a description.
 
-A slip may have been made everywhere that the same part stands, as in [I - HφK]* D⁻¹ [I - HφK] with φ for ψ: each change is also made
-at all places of equal parts at once.
+A slip may occur at every copy of the same part, as in [I - HφK]* D⁻¹ [I - HφK] with φ for ψ: each change is also made
+in all equal parts at once.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _ADDED = ("I", "phi", "psi", "M", "P", "R", "J", "D", "K", "G")
 
 @dataclass(frozen=True)
 class Slip:
-    """What was done wrong, and what it costs to believe it: the likelier slips cost less."""
+    """A mistake in words, and its cost: likelier slips cost less."""
 
     words: str
     cost: float
 
 
 def changed(formula: Formula) -> Iterator[tuple[Formula, Slip]]:
-    """Every formula one change away, and the slip that would have led from it to the typed one."""
+    """Yield every formula one change away, and the slip that leads from it to the typed one."""
     seen = {formula}
     for new, slip in _all(formula):
         if new not in seen and new[0] != new[1]:
@@ -62,7 +62,7 @@ def _replaced(tree: Node, old: Node, new: Node) -> Node:
 
 
 def _within(node: Node) -> Iterator[tuple[Node, Slip]]:
-    """Changes of a part or of something in it."""
+    """Yield changes of a part or within it."""
     yield from _local(node)
     letters = [p for child in node.children for p in parts(child) if isinstance(p, Letter)]
     for i, child in enumerate(node.children):
@@ -90,7 +90,7 @@ def _shown(node: Node) -> str:
 
 
 def _local(node: Node) -> Iterator[tuple[Node, Slip]]:
-    """Changes of this part itself."""
+    """Yield changes of this part itself."""
     if isinstance(node, Number):
         return
     if isinstance(node, Sum):
@@ -116,7 +116,7 @@ def _local(node: Node) -> Iterator[tuple[Node, Slip]]:
 
 
 def _numbers(node: Node) -> Iterator[tuple[Node, Slip]]:
-    """Changes of a whole side by a number."""
+    """Yield changes of a whole side by a number."""
     if isinstance(node, (Sum, Number)):
         return
     for value, name in (*_scales(node), (Fraction(-1), "-1")):
@@ -125,7 +125,7 @@ def _numbers(node: Node) -> Iterator[tuple[Node, Slip]]:
 
 
 def _scales(node: Node) -> tuple[tuple[Fraction, str], ...]:
-    """Numbers that may be missing in a term; none where it has one, which may be one too many."""
+    """Return numbers that may be missing in a term; none if it has a number, which may be superfluous."""
     has_one = isinstance(node, Product) and any(isinstance(f, Number) for f in node.factors)
     return () if has_one else ((Fraction(2), "2"), (Fraction(1, 2), "½"))
 

@@ -20,7 +20,7 @@ from .. import _core
 from ..models.generators import tree
 from ..state import State
 from .parse import Statement, Statements
-from .part_letters import HYBRID
+from .part_letters import VECTORS
 
 _SIZES = {kind: row.nv for kind, row in _core.hinge_kinds.items()} | {"custom": 3}
 DOF = dict(sorted(_SIZES.items(), key=lambda item: item[1]))
@@ -186,7 +186,7 @@ def named_vectors(read: Statement) -> dict[str, str]:
             todo += side.operands()
         elif isinstance(side, _core.Operator):
             todo += side.children
-            if side.kind == "vector" and side.name not in HYBRID:
+            if side.kind == "vector" and side.name not in VECTORS:
                 found[side.name] = side.codomain.name
     return found
 
@@ -198,7 +198,7 @@ def read_on(text: str, spec: Spec, model: Any, vectors: Mapping[str, str] | None
         return None
     named = {name: _core.vector(name, spaces[space]) for name, space in (vectors or {}).items()}
     try:
-        return Statements(model.soa, named).read(respelled(text, spec))
+        return Statements(model.soa, named).read(respelled(text, spec), inequalities=True)
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError):
         return None
 

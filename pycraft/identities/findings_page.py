@@ -1,7 +1,7 @@
-"""Theorems and what was found of them in HTML: one of them, and all as a table that is filtered by verdict and by words.
+"""Theorems and findings in HTML: a single one, and all as a table with filters by verdict and by words.
 
-What is shown needs nothing from elsewhere. Where scripts do not run, as in saved notebooks that are not trusted, the whole table stands,
-without its buttons.
+The page is self-contained. Where scripts do not run, as in untrusted notebooks, it shows the whole table,
+without buttons.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from .verdict_html import verdict_html
 
 _CARD = '<div style="font:13px/1.5 system-ui,sans-serif;color:inherit">{}</div>'
 _WORDS = "text-align:left;vertical-align:top;white-space:normal"
-"""Of a cell, whose style a notebook's own style sheet would set otherwise."""
+"""Style of a cell, set here because a notebook's own style sheet would override it."""
 _KEPT = "text-align:left;vertical-align:top;white-space:nowrap;width:1%"
 _NUMBER = "text-align:right;vertical-align:top;white-space:nowrap;width:1%"
 _SMALL = '<div style="font-size:85%;opacity:.8">{}</div>'
 
 
 def theorem_html(theorem: _core.Theorem) -> str:
-    """`Theorem._repr_html_`: name, statement, hypotheses with those that its model does not meet, use and source."""
+    """Return name, statement, hypotheses with the unmet ones, use and source (`Theorem._repr_html_`)."""
     if theorem.waiting:
         return _CARD.format(f"<b>{escape(theorem.name)}</b><div>waits for {escape(theorem.waiting)}</div>")
     sources = getattr(theorem.lhs, "sources", []) or getattr(theorem.rhs, "sources", [])
@@ -42,14 +42,14 @@ def theorem_html(theorem: _core.Theorem) -> str:
 
 
 def finding_html(found: Any) -> str:
-    """A finding by itself: the verdict, the theorem, its hypotheses, and the residual and bound that it rests on."""
+    """Return a single finding: the verdict, the theorem, its hypotheses, and the deciding residual and bound."""
     about = [f"where {', '.join(found.hypotheses)}" if found.hypotheses else "no hypothesis", *_notes(found), *_numbers(found)]
     head = f"{verdict_html(found.verdict)} &ensp; <b>{escape(found.name)}</b>"
     return _CARD.format(f"{head}<div>{formula_html(found.statement)}</div>{_SMALL.format(escape('; '.join(about)))}")
 
 
 def report_html(report: Any) -> str:
-    """A report as a table, what does not simply hold before the groups, with buttons for verdicts and a field for words."""
+    """Return a report as a table, exceptions before the groups, with buttons for verdicts and a field for words."""
     exceptions: Sequence[Any] = report.exceptions
     counts = report.counts()
     buttons = "".join(
@@ -78,7 +78,7 @@ def report_html(report: Any) -> str:
 
 
 def statement_html(report: Any) -> str:
-    """A `CheckReport`: verdict, statement and what is said below; on random trees, what hypotheses make true has its own sign."""
+    """Return a `CheckReport`: verdict, statement and details; on random trees, "true under hypotheses" has its own sign."""
     from .truth import in_words
 
     details = "".join(f'<div style="white-space:pre-wrap">{escape(line.strip())}</div>' for line in report.details())

@@ -1,7 +1,7 @@
-"""Formulas as they were typed, whether their spaces fit or not: a small syntax tree, and how it is written.
+"""Formulas as typed, even if their spaces do not match: a small syntax tree, and its text.
 
-`Statements` reads expressions, which exist only where spaces fit. A formula with a star too few may fit nowhere; it still has an
-arrangement of letters, which can be changed (`edits`). `formula_reading` makes it from text, `formula_values` gives it dense values.
+`Statements` reads expressions, which exist only if spaces match. A formula with a missing star may not match at all; it still has an
+arrangement of letters, which can be changed (`edits`). `formula_reading` builds it from text, `formula_values` evaluates it densely.
 """
 
 from __future__ import annotations
@@ -68,14 +68,14 @@ Formula = tuple[Node, Node]
 
 # ---------------------------------------------------------------------- made simply
 def product(*factors: Node) -> Node:
-    """A product, flat, without an I beside other factors."""
+    """Return a flat product, without I beside other factors."""
     made = flat(factors)
     made = [f for f in made if f != Letter("I")] if any(not isinstance(f, Number) and f != Letter("I") for f in made) else made
     return made[0] if len(made) == 1 else Product(tuple(made))
 
 
 def total(terms: list[tuple[int, Node]]) -> Node:
-    """A sum, flat; a 0 where nothing is left."""
+    """Return a flat sum; 0 if it is empty."""
     if not terms:
         return Number(Fraction(0))
     flat: list[tuple[int, Node]] = []
@@ -87,17 +87,17 @@ def total(terms: list[tuple[int, Node]]) -> Node:
 
 
 def starred(node: Node) -> Node:
-    """The transpose: a second star takes the first away."""
+    """Return the transpose; a second star cancels the first."""
     return node.inner if isinstance(node, Star) else Star(node)
 
 
 def inverted(node: Node) -> Node:
-    """The inverse: a second takes the first away."""
+    """Return the inverse; a second one cancels the first."""
     return node.inner if isinstance(node, Power) and node.exponent == -1 else Power(node, -1)
 
 
 def rebuilt(node: Node, children: list[Node]) -> Node:
-    """The same node over other children."""
+    """Return the same node with other children."""
     match node:
         case Star():
             return starred(children[0])
@@ -114,7 +114,7 @@ def rebuilt(node: Node, children: list[Node]) -> Node:
 
 # ---------------------------------------------------------------------- formula to text
 def written(node: Node, shown: bool = False) -> str:
-    """As text that reads in one way only; `shown`: as the book prints it."""
+    """Return unambiguous text; with `shown`, the book's notation."""
     match node:
         case Letter(name=name, arguments=arguments):
             return (_SHOWN.get(name, name) if shown else name) + (f"({', '.join(arguments)})" if arguments else "")
@@ -138,7 +138,7 @@ def written(node: Node, shown: bool = False) -> str:
 
 
 def _number(value: Fraction) -> str:
-    """A decimal where that is it exactly, else a ratio."""
+    """Return a decimal if it is exact, else a ratio."""
     near = repr(float(value)).removesuffix(".0")
     return near if Fraction(near) == value else str(value)
 
@@ -154,5 +154,5 @@ def _bracketed(node: Node, shown: bool) -> str:
 
 
 def written_statement(formula: Formula, shown: bool = False) -> str:
-    """Both sides, see `written`."""
+    """Return both sides as text, see `written`."""
     return f"{written(formula[0], shown)} {'=' if shown else '=='} {written(formula[1], shown)}"

@@ -9,11 +9,13 @@ from functools import lru_cache
 
 from .determinant_equations import as_logarithms
 from .formula import FUNCTIONS, INDEXED, SYMBOLS, Call, Formula, Letter, Node, Number, Power, Star, inverted, product, starred, total
+from .inequalities import related
+from .part_letters import HYBRID, OF_ROTORS, OF_TREES
 from .spelling import spelled
 from .standard_letters import GUARDED, STANDARD
 from .vocabulary import ParseError, decimal
 
-_PLAIN = (set(SYMBOLS) - set(INDEXED)) | {"X", "V", "vdot", *STANDARD}
+_PLAIN = (set(SYMBOLS) - set(INDEXED)) | {"X", "V", "vdot", *STANDARD, *HYBRID, *OF_TREES, *OF_ROTORS}
 LETTERS = frozenset(_PLAIN | {f"{name}_dot" for name in _PLAIN - {"I", "N"} if not name.endswith("dot")})
 """Letters that formulas have without definitions."""
 
@@ -28,6 +30,8 @@ def read_formula(text: str, own: Iterable[str] = ()) -> Formula:
     source = as_logarithms(spelled(text).text)
     is_python = re.search(r"@|\.T\b|\.inv\(|\binv\(", source) and "^" not in source
     sides = re.split(r"==?", source)
+    if related(source)[0] != "=":
+        raise ParseError(f"{text!r} is an inequality: pycraft.check, pycraft.truth and pycraft.prove take it")
     if len(sides) != 2:
         raise ParseError(f"{text!r} has {'one side' if len(sides) == 1 else 'more than two sides'}; a statement is lhs == rhs")
     defined = frozenset(own)

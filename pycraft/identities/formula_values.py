@@ -1,4 +1,4 @@
-"""Dense values of formulas, in double: whether two sides fit and are equal on a model."""
+"""Dense values of formulas, in double: comparison of two sides on a model."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .parse import Statements
 
 
 class Misfit(Exception):
-    """Spaces that do not fit, or an inverse that does not exist."""
+    """Spaces do not match, or an inverse does not exist."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """A dense array (a number where the spaces are None), its codomain and domain; those of an I that has none yet are "any"."""
+    """A dense array (a number if the spaces are None), its codomain and domain; "any" for an I without a space."""
 
     array: np.ndarray
     codomain: str | None
@@ -29,7 +29,7 @@ class Value:
 
 
 class DenseLetters(Mapping[str, Value]):
-    """The letters of a model at its state, as dense arrays, and those that are defined by others; the duals of their spaces."""
+    """The letters of a model at its state, as dense arrays, with defined letters; and the duals of their spaces."""
 
     def __init__(self, model: Any, definitions: Sequence[Definition] = ()):
         self._operators, self._definitions = model.soa, definitions
@@ -54,7 +54,7 @@ class DenseLetters(Mapping[str, Value]):
         self.dual |= {operator.codomain.name: turned.domain.name, operator.domain.name: turned.codomain.name}
 
     def of(self, letter: Letter) -> Value:
-        """The value of a letter, with arguments or without."""
+        """Return the value of a letter, with or without arguments."""
         if not letter.arguments:
             return self[letter.name]
         key = (letter.name, *letter.arguments)
@@ -85,7 +85,7 @@ class DenseLetters(Mapping[str, Value]):
 
 
 def evaluate(node: Node, letters: DenseLetters) -> Value:
-    """The value of a formula; raises Misfit where spaces do not fit."""
+    """Return the value of a formula. Raises Misfit if spaces do not match."""
     match node:
         case Letter():
             return letters.of(node)
@@ -174,9 +174,9 @@ def _function(function: str, value: Value, inner: Node) -> Value:
 
 
 def residual(formula: Formula, letters: DenseLetters) -> float:
-    """How far both sides are apart relative to the larger; infinite where both are zero, or one is and is not said to be.
+    """Return the difference of both sides relative to the larger; infinite if both are zero, or if one is zero without stating so.
 
-    Raises Misfit where spaces do not fit.
+    Raises Misfit if spaces do not match.
     """
     left, right = evaluate(formula[0], letters), evaluate(formula[1], letters)
     said_zero = [side == Number(Fraction(0)) for side in formula]

@@ -1,17 +1,17 @@
-"""Whether a statement is true at a state: its residual is taken in wider and wider scalars until it is decided.
+"""Truth of a statement at a state: its residual is computed in wider and wider scalars until it is decided.
 
-Of a true statement the residual is rounding, and falls with epsilon. Of a false one it stays where it is. So
+The residual of a true statement is rounding, and falls with epsilon. The residual of a false one stays the same. So
 
-- *holds*: the residual is below its derived bound (`bounds`) in a scalar in which that bound is at most `DECIDES`, and has fallen there
-  with epsilon, or is exactly zero. Where it falls twice running, to below `DECIDES`, it need not be below the bound; where it falls three
-  times running, its own fall is a bound, and takes the place of a derived one that decides nothing;
-- *fails*: it is the same in three scalars running, above its bound in the widest of them;
+- *holds*: the residual is below its derived bound (`residual_bounds`) in a scalar with a bound of at most `DECIDES`, and has fallen there
+  with epsilon, or is exactly zero. If it falls twice in succession, to below `DECIDES`, it need not be below the bound; if it falls three
+  times in succession, its own fall is a bound, which replaces a derived bound that is too large to decide;
+- *fails*: it is the same in three successive scalars, and above its bound in the widest of them;
 - *undecided*: neither, up to the widest scalar.
 
-A bound says what rounding can do; no bound, however large, makes a residual true that does not fall: in the widest scalar, where it can
-be explained by nothing else, it fails. Where numbers of a statement are nearer to each other than `DECIDES` (φ = φ + 10⁻⁴⁰φ), a bound
-decides where it tells them apart; what no scalar tells apart is undecided. A scalar in which an inverse is refused as singular says
-nothing; the next one is asked.
+A bound limits the effect of rounding; no bound, however large, makes a statement true if its residual does not fall: in the widest scalar,
+without another explanation, it fails. If numbers of a statement are closer to each other than `DECIDES` (φ = φ + 10⁻⁴⁰φ), a bound
+decides only if it distinguishes them; if no scalar does, the statement is undecided. A scalar in which an inverse is refused as singular
+is skipped for the next one.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from .. import _core
 from .residual_bounds import CONSTANT, EPSILON, Roundings, Sizes
 
 DECIDES = 1e-12
-"""A bound above this decides nothing: differences as small as the bound are not seen."""
+"""A larger bound decides nothing: it hides smaller differences."""
 SCATTER = 64.0
-"""How far from the ratio of the epsilons the fall of a residual may be: a residual is one number and scatters."""
+"""Allowed factor between the fall of a residual and the ratio of the epsilons: a single residual scatters."""
 STAYS = 0.5
-"""A residual that keeps this part of itself from one scalar to the next has not fallen."""
+"""A residual that keeps this fraction from one scalar to the next has not fallen."""
 RUNNING = 3
-"""So many falls running are no chance: each is by the ratio of two epsilons, 2000 and more."""
+"""Number of successive falls that cannot be chance: each is by the ratio of two epsilons, at least 2000."""
 ROUNDING_NORMS = 1e-3
-"""A bound above this in double: norms that it is made of may be rounding themselves, and are taken again in quad."""
+"""If a bound in double exceeds this, its norms may be rounding, and are computed again in quad."""
 HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 
 
 class UndecidedError(_core.EvaluationError):
-    """A verdict was asked of a statement that is neither seen to hold nor seen to fail in the widest scalar tried."""
+    """A statement was used as a condition, but is undecided in the widest scalar tried."""
 
 
 @dataclass(frozen=True)
 class Taken:
-    """The residual in one scalar, relative to the size of what it is a difference of, and its derived bound."""
+    """The residual in one scalar, relative to the size of the compared sides, and its derived bound."""
 
     precision: str | int
     residual: float
@@ -56,7 +56,7 @@ class Taken:
 
 
 class BoundState:
-    """One state of one model: expressions are bound to it once per precision, so that all of them share its values."""
+    """One state of one model: expressions are bound to it once per precision, so that they share its values."""
 
     def __init__(self, operators: Any, state: Any):
         self.state = state
@@ -72,7 +72,7 @@ class BoundState:
         return side.bound(binding) if isinstance(side, _core.Scalar) else side._bound(binding)
 
     def sizes(self, precision: str | int, values: dict[str, list[float]]) -> Sizes:
-        """Norms in one precision, shared by all statements at this state."""
+        """Return norms in one precision, shared by all statements at this state."""
         if precision not in self._sizes:
             self._sizes[precision] = Sizes(lambda e: self.bind(e, precision), precision == "double")
         self._sizes[precision].give(values)
@@ -81,17 +81,17 @@ class BoundState:
 
 @dataclass
 class Judgement:
-    """One statement at one state: the residuals that were taken, and what they say."""
+    """One statement at one state: its residuals, and the verdict from them."""
 
     taken: list[Taken] = field(default_factory=list)
     state: Any = None
     verdict: str = UNDECIDED
     zero: bool = False
-    """Whether both sides are zero, though neither is said to be: then the statement is true here, and says nothing."""
+    """True if both sides are zero although neither is stated to be: the statement is then trivially true here."""
 
     @property
     def decisive(self) -> Taken:
-        """The scalar that decided: the last one tried."""
+        """The deciding scalar: the last one tried."""
         return self.taken[-1]
 
     @property
@@ -100,7 +100,7 @@ class Judgement:
 
 
 def ladder(first: str | int = "extended", last: str | int = 100) -> list[str | int]:
-    """Double, then the scalars from `first` to `last`."""
+    """Return double, then the scalars from `first` to `last`."""
     names: list[str | int] = list(EPSILON)
     return ["double", *names[names.index(first) : max(names.index(first), names.index(last)) + 1]]
 
@@ -123,12 +123,12 @@ def judge(
     vectors : values of the named vectors of the statement
     precisions : double and wider ones, tried in this order until one decides; see `ladder`
     on_one_path : only blocks (i, j) with i and j on one path to the base count
-    decides : the largest bound that decides; of a statement with numbers as `statement_text.telling` says
+    decides : the largest bound that decides; for a statement with numbers, from `statement_text.telling`
 
     Raises
     ------
     SingularOperatorError, SingularHingeError
-        An inverse is refused in every precision that was tried.
+        An inverse is refused in every precision tried.
     """
     values = {name: [float(x) for x in value] for name, value in (vectors or {}).items()}
     found = Judgement(state=at.state)
@@ -142,7 +142,7 @@ def judge(
             found.taken, zero, amplified = scales.taken(precision, entries)
         except (_core.SingularOperatorError, _core.SingularHingeError) as error:
             refusal = error
-            if len(found.taken) == 0 and precision == "quad":  # what three scalars refuse is singular
+            if len(found.taken) == 0 and precision == "quad":  # refused in three scalars: singular
                 break
             continue
         found.zero = zero and not said_zero
@@ -160,12 +160,12 @@ def judge(
 
 
 def seen_bound(taken: list[Taken]) -> float:
-    """The bound that a fall through several scalars is: their largest residual over epsilon, in the widest, with room for scatter."""
+    """Return the bound implied by a fall through several scalars: their largest residual over epsilon, in the widest, with a margin."""
     return SCATTER * taken[-1].epsilon * max(t.residual / t.epsilon for t in taken)
 
 
 class Scales:
-    """What a difference of two sides is relative to, and how large rounding can make it; norms are shared by all precisions."""
+    """Scale of the difference of two sides, and the possible effect of rounding; norms are shared by all precisions."""
 
     def __init__(self, lhs: Any, rhs: Any, at: BoundState, values: dict[str, list[float]]):
         self._lhs, self._rhs, self._at, self._values = lhs, rhs, at, values
@@ -175,8 +175,8 @@ class Scales:
     def taken(self, precision: str | int, entries: tuple[float, float, float]) -> tuple[list[Taken], bool, float]:
         """(the residuals in all precisions so far, whether both sides are rounding, the growth), with the entries of lhs - rhs, lhs, rhs.
 
-        A side that is zero is rounding, and falls with epsilon. Where both fall, the difference is relative to what they are rounding of:
-        the largest of entry over epsilon.
+        A side that is zero is rounding, and falls with epsilon. If both fall, the difference is relative to the values of which they are
+        rounding: the largest of entry over epsilon.
         """
         made = self._roundings("double", precision in ("double", "extended"))
         sides = max(entries[1:])
@@ -196,12 +196,12 @@ class Scales:
 
     @staticmethod
     def _trusted(made: Roundings, sides: float, fall: bool) -> bool:
-        """Whether norms of double can be judged by: they are no rounding. The size of sides that fall is not asked for."""
+        """Return True if norms in double are reliable: they are not rounding. The size of sides that fall is not needed."""
         relative = 1.0 if made.counted or (fall and made.terms == 0) else made.size / max(sides, 1e-300)
         return made.bound(relative, "double") <= ROUNDING_NORMS
 
     def _sides_fall(self) -> bool:
-        """Whether both sides are zero, or were rounding in the last two precisions."""
+        """Return True if both sides are zero, or were rounding in the last two precisions."""
         if not any(size for *_, size in self._entries):
             return True
         if len(self._entries) < 2:
@@ -210,7 +210,7 @@ class Scales:
         return after <= SCATTER * EPSILON[wide] / EPSILON[narrow] * before
 
     def _roundings(self, precision: str | int, needed: bool) -> Roundings | None:
-        """By norms in this precision; None where an inverse is refused in it, and they are not needed."""
+        """Return roundings from norms in this precision; None if an inverse is refused in it, and they are not needed."""
         if precision not in self._made:
             try:
                 self._made[precision] = Roundings(self._lhs, self._rhs, self._at.sizes(precision, self._values))
@@ -222,7 +222,7 @@ class Scales:
 
 
 def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False, decides: float = DECIDES) -> str:
-    """The verdict on residuals in wider and wider scalars, as far as they go; `last` where none follows."""
+    """Return the verdict on residuals in wider and wider scalars so far; `last` if none follows."""
     if len(taken) < 2 or not np.isfinite(taken[-1].residual):
         return UNDECIDED
     wide = taken[-1]
@@ -240,8 +240,8 @@ def decided(taken: list[Taken], amplified: float = 1.0, *, last: bool = False, d
 
 
 def _falls(narrower: list[Taken], wide: Taken, amplified: float) -> bool:
-    """Whether a residual has fallen with epsilon. A narrower one may be small, or zero, by luck: the largest of them over epsilon counts,
-    and where the sweep amplifies roundings, what it makes of one."""
+    """Return True if a residual has fallen with epsilon. A narrower one may be small, or zero, by chance: the largest over epsilon counts,
+    and the amplification of a rounding by the sweep."""
     if wide.residual == 0:
         return True
     seen = max([1.0, *(t.residual / t.epsilon for t in narrower if np.isfinite(t.residual))])
@@ -256,7 +256,7 @@ class Verdict:
 
     @property
     def verdict(self) -> str:
-        """ "fails" where it fails at a state, "holds" where it holds at all of them, and there is one."""
+        """ "fails" if it fails at a state, "holds" if there are states and it holds at all."""
         found = {j.verdict for j in self.judgements}
         return FAILS if FAILS in found else HOLDS if found == {HOLDS} else UNDECIDED
 
@@ -266,12 +266,12 @@ class Verdict:
 
     @property
     def zero(self) -> bool:
-        """Whether both sides were zero at every state."""
+        """True if both sides were zero at every state."""
         return all(j.zero for j in self.judgements)
 
     @property
     def shown(self) -> Judgement:
-        """The state that the verdict rests on: one where it is as bad, in the widest scalar, with the largest residual."""
+        """The state that decides the verdict: the one with the largest residual in the widest scalar."""
         of_that = [j for j in self.judgements if j.verdict == self.verdict]
         return max(of_that, key=lambda j: (-j.decisive.epsilon, _order(j.decisive.residual)))
 
@@ -291,5 +291,5 @@ def _order(x: float) -> float:
 
 
 def judge_states(lhs: Any, rhs: Any, states: Iterable[BoundState], vectors: Iterable[dict[str, np.ndarray]], **options: Any) -> Verdict:
-    """`judge` at each of these states."""
+    """Return `judge` at each of these states."""
     return Verdict([judge(lhs, rhs, at, values, **options) for at, values in zip(states, vectors, strict=True)])

@@ -1,11 +1,11 @@
 r"""The displayed equations of a LaTeX paper, each with its verdict: `pycraft check paper.tex`.
 
 Displays are ``\[ \]``, ``$$ $$`` and the environments of equation, align, gather, multline, eqnarray and their like. Rows are joined where
-one begins with a sign and chained where one begins with an equals sign: A = B = C is A = B and B = C. Macros that the paper defines are
-expanded, arguments such as ``(\theta, \dot\theta)`` behind an operator are left out. What is true under a standard hypothesis alone
-(J = 0, say) is told apart from what is false: papers say their hypotheses in words. An equation with one letter on its left that is not
-known, or with :=, defines it for all equations of the paper. An equation that does not read as a statement of operators is listed with the
-reason, never left out; one of operators whose spaces do not fit is false.
+a row begins with a sign, and chained where a row begins with an equals sign: A = B = C is A = B and B = C. Macros defined in the paper are
+expanded; arguments such as ``(\theta, \dot\theta)`` after an operator are ignored. Equations true only under a standard hypothesis
+(such as J = 0) are distinguished from false ones, because papers state hypotheses in words. An equation with a single unknown letter on
+its left, or with :=, defines it for all equations of the paper. An equation that is not a statement of operators is listed with the
+reason, never omitted; an equation of operators with spaces that do not match is false.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _DEFINES = re.compile(
 )
 
 
-# What an operator depends on, behind its letter: (\theta), (\theta, \dot{\theta}), (q, \dot q).
+# Arguments after an operator's letter: (\theta), (\theta, \dot{\theta}), (q, \dot q).
 _ANGLE = r"(?:\\d?dot\s*(?:\{\s*(?:\\theta|q)\s*\}|\s(?:\\theta|q)|\\theta)|\\theta|q)"
 _ARGUMENTS = re.compile(rf"(?<=[A-Za-z}}\])])\s*(?:\\left)?\(\s*{_ANGLE}(?:\s*,\s*{_ANGLE})*\s*(?:\\right)?\)")
 
@@ -50,8 +50,8 @@ HOLDS, TRUE_WHERE, FAILS, UNDECIDED, NOT_READ, DEFINES = "holds", "true where", 
 class Equation:
     """One statement of a paper.
 
-    `verdict` is "holds", "fails", "undecided" or "not read", "defines" of what defines a letter, or "true where", with the hypotheses in
-    `where`. `understood` is how it was read, `note` what else is to be said: the smallest counterexample, the reason why it was not read.
+    `verdict` is "holds", "fails", "undecided" or "not read", "defines" for the definition of a letter, or "true where", with the hypotheses
+    in `where`. `understood` is the equation as read, `note` further text: the smallest counterexample, or why it was not read.
     """
 
     line: int
@@ -69,7 +69,7 @@ class Equation:
 
 @dataclass
 class PaperReport:
-    """The equations of one file, in order. True if something was read, and all of that holds or is true under hypotheses that are told."""
+    """The equations of one file, in order. True if something was read, and all of it holds or is true under the given hypotheses."""
 
     path: str
     equations: list[Equation]
@@ -128,17 +128,17 @@ def check_paper(
     Parameters
     ----------
     path : a LaTeX file, UTF-8; files that it includes are not followed
-    model : Multibody or OperatorSet; random trees of all hinge kinds where left out
-    states, seed, search, precision : as `pycraft.check` has them
+    model : Multibody or OperatorSet; default: random trees of all hinge kinds
+    states, seed, search, precision : as for `pycraft.check`
     progress : called with the line of each equation, if given
-    dialect : the school in whose letters it is written, see `pycraft.check`
+    dialect : notation of the paper, see `pycraft.check`
 
     Raises
     ------
     ModelError
-        No file of that name, or it is not text in UTF-8.
+        The file does not exist, or is not text in UTF-8.
     EvaluationError
-        No such precision, or none that is wider than double.
+        An unknown precision, or one that is not wider than double.
     """
     from .checker import check, check_wider
 
@@ -171,7 +171,7 @@ class Said:
 
 
 def _sides(latex: str) -> Iterator[tuple[str, str, str]]:
-    """(lhs, rhs, sign) for each equals sign of a row that stands outside of brackets; several statements stand apart by commas."""
+    """Yield (lhs, rhs, sign) for each equals sign of a row outside brackets; commas separate statements."""
     rows = pieces(latex, ",")
     if len(rows) > 1 and (says_by_block(latex) or not all(len(_chain(row)) > 1 for row in rows)):
         rows = [latex]
@@ -184,7 +184,7 @@ def _sides(latex: str) -> Iterator[tuple[str, str, str]]:
 
 
 def _chain(row: str) -> list[tuple[str, str]]:
-    """(side, the sign before it)."""
+    """Return (side, the sign before it)."""
     found: list[tuple[str, str]] = []
     begin, sign = 0, ""
     for match in _EQUALS.finditer(row):
@@ -196,7 +196,7 @@ def _chain(row: str) -> list[tuple[str, str]]:
 
 
 class _Letters:
-    """The letters that a paper defines, and by which of its statements."""
+    """The letters that a paper defines, and the defining statements."""
 
     def __init__(self, statements: Sequence[Said], model: Any, check: Callable[[str], Any], dialect: str | None = None):
         self.definitions: dict[Said, Equation] = {}
@@ -228,7 +228,7 @@ class _Letters:
 
     @staticmethod
     def _holds(text: str, check: Callable[[str], Any]) -> bool:
-        """Whether what is said to define a letter of the book is so."""
+        """Return True if a definition of a letter of the book is correct."""
         try:
             report = check(text)
         except (_core.Error, ArithmeticError):
@@ -236,7 +236,7 @@ class _Letters:
         return report.verdict == HOLDS or bool(report.true_where)
 
     def before(self, said: Said) -> str:
-        """The definitions that a statement needs, as they stand before it: of each letter the last one above it, else the first below."""
+        """Return the definitions that a statement needs: for each letter the last one before it, else the first after it."""
         chosen: dict[str, tuple[Said, Definition]] = {}
         for at, made in self._made:
             if made.name not in chosen or at.line <= said.line:
@@ -262,7 +262,7 @@ def _read(path: Path) -> str:
 
 
 def _judged(said: Said, before: str, check: Callable[[str], Any], on_trees: bool) -> Equation:
-    """A statement, with the definitions before it. A model of one's own meets its hypotheses or does not; random trees do both."""
+    """Judge a statement with the definitions before it. A user's model meets its hypotheses or not; random trees do both."""
     from .truth import in_words
 
     line, text = said.line, said.text
@@ -289,7 +289,7 @@ def _judged(said: Said, before: str, check: Callable[[str], Any], on_trees: bool
 
 
 def equations(source: str) -> Iterator[tuple[int, str]]:
-    """(line, text) of every row of every display that makes a statement, macros expanded."""
+    """Return (line, text) of every statement in the displays, with macros expanded."""
     source = re.sub(r"(?<!\\)%.*", "", source)
     macros = _macros(source)
     for match in _DISPLAY.finditer(source):
@@ -314,7 +314,7 @@ def _rows(body: str, line: int, macros: dict[str, tuple[int, str]]) -> Iterator[
         at += len(piece)
     joined: list[tuple[int, str]] = []
     for start, text in rows:
-        if joined and re.match(r"[-+=·@]|\\(cdot|times)", text):  # a row that goes on
+        if joined and re.match(r"[-+=·@]|\\(cdot|times)", text):  # a continued row
             joined[-1] = (joined[-1][0], f"{joined[-1][1]} {text}")
         else:
             joined.append((start, text))
@@ -322,7 +322,7 @@ def _rows(body: str, line: int, macros: dict[str, tuple[int, str]]) -> Iterator[
 
 
 def _plain(row: str) -> str:
-    """A row without what numbers, labels and sets it, and without the point that ends its sentence."""
+    """Return a row without numbers, labels and layout, and without its final full stop."""
     row = re.sub(r"\\(label|tag\*?|notag|nonumber|intertext|shortintertext)\s*(\{[^{}]*\})?", " ", row)
     row = re.sub(r"\\(begin|end)\{(split|aligned|gathered|subequations)\}(\[[^\]]*\])?", " ", row)
     row = _ARGUMENTS.sub("", row)
@@ -330,7 +330,7 @@ def _plain(row: str) -> str:
 
 
 def _apart(row: str) -> Iterator[str]:
-    r"""Statements that stand in one row, apart by \quad; words beside them are left out."""
+    r"""Return the statements in one row, separated by \quad; words between them are ignored."""
     for part in re.split(r"\\q?quad(?![A-Za-z])", row):
         part = re.sub(r"\\(?:text|mbox|textrm|textit)\s*\{(?=[^{}]*\s)[^{}]*\}", " ", part)
         part = re.sub(r"(\\[,;:!>\s]|[.,;:\s])+$", "", part.strip())
@@ -349,7 +349,7 @@ def _macros(source: str) -> dict[str, tuple[int, str]]:
 
 
 def _braced(source: str, at: int) -> str:
-    """What stands between the brace at `at` and its partner."""
+    """Return the text between the brace at `at` and its partner."""
     depth = 0
     for end in range(at, len(source)):
         depth += {"{": 1, "}": -1}.get(source[end], 0)
@@ -359,11 +359,11 @@ def _braced(source: str, at: int) -> str:
 
 
 def _expanded(row: str, macros: dict[str, tuple[int, str]]) -> str:
-    """A row with the paper's own macros put in, macros of macros too."""
+    """Return a row with the paper's macros expanded, recursively."""
     if not macros:
         return row
     pattern = re.compile(r"\\(" + "|".join(map(re.escape, macros)) + r")(?![A-Za-z])")
-    for _ in range(1000):  # a macro of itself has no end
+    for _ in range(1000):  # a recursive macro has no end
         match = pattern.search(row)
         if match is None:
             break

@@ -22,7 +22,8 @@ from .book import read_book
 from .definitions import Definition, meant, shown_text
 from .determinant_equations import as_logarithms
 from .dialects import divided
-from .spelling import Spelled, spelled
+from .inequalities import check_comparable, related
+from .spelling import Spelled, spelled, stars_behind_nodes
 from .vocabulary import FUNCTIONS, WITH_ARGUMENTS, Misread, ParseError, SpacesError, Vocabulary, decimal, is_number, is_operator, power
 
 __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
@@ -32,7 +33,8 @@ __all__ = ["ParseError", "Statement", "Statements", "check_has_space"]
 class Statement:
     """Two sides, as expressions of one model, and the text they were read from. A lone expression has no right side.
 
-    `letters` are those that were defined around it, or stand for others, and what they stand for, as they are shown.
+    `relation` is =, or the sign of an inequality. `letters` are those that were defined around it, or stand for others, and what they
+    stand for, as they are shown.
     """
 
     lhs: Any
@@ -40,6 +42,7 @@ class Statement:
     text: str
     reading: str
     letters: dict[str, str] = field(default_factory=dict)
+    relation: str = "="
     _shown: Callable[[], Statement] | None = None
 
     @property
@@ -51,7 +54,7 @@ class Statement:
                 at = self._shown()
             except (_core.Error, ArithmeticError, TypeError, ValueError, AttributeError):
                 pass  # a letter that stands for itself has no inverse, root or rate that could be shown
-        text = _text(at.lhs) + ("" if at.rhs is None else f" = {_text(at.rhs)}")
+        text = _text(at.lhs) + ("" if at.rhs is None else f" {self.relation} {_text(at.rhs)}")
         where = "; ".join(f"{name} = {what}" for name, what in self.letters.items()) if at is not self else ""
         return (f"{text}, where {where}" if where else text).replace("vdot", "θ̈")
 
@@ -65,8 +68,10 @@ class Statements:
         self._operators, self._vector = operators, vector
         self._vocabulary = Vocabulary(operators, extra, read=self._meaning, **options)
 
-    def read(self, text: str, before: Sequence[Definition] = ()) -> Statement:
+    def read(self, text: str, before: Sequence[Definition] = (), *, inequalities: bool = False) -> Statement:
         """The statement, by the one reading whose names and spaces fit, with the definitions around it and those before.
+
+        `inequalities` says whether it may be one; what handles equations alone refuses them by name.
 
         Raises
         ------
@@ -76,7 +81,9 @@ class Statements:
         definitions, claim = divided(text, self._is_by_block)
         definitions = [*before, *definitions]
         refuse_by_block(claim, self._vocabulary.own | {d.name for d in definitions})
-        source = spelled(claim)
+        source = self._spelled(claim)
+        if not inequalities and related(source.text)[0] != "=":
+            raise ParseError(f"{text!r} is an inequality: pycraft.check, pycraft.truth and pycraft.prove take it")
         vocabulary = self._with(definitions)
         refusal: ParseError | None = None
         for choice in vocabulary.choices(" ".join([source.text, *(spelled(d.what).text for d in definitions)])):
@@ -91,6 +98,12 @@ class Statements:
         """Return the meaning of a letter under these definitions. Raises ParseError."""
         return self._with(definitions).operator(name)
 
+    def _spelled(self, text: str) -> Spelled:
+        source, model = spelled(text), self._operators._model
+        if re.search(r"(?<![A-Za-z_])(?:B|Jacobian|Lambda)\s*[\^*'.]", source.text):
+            stars_behind_nodes(source, [*getattr(model, "nodes", ()), *getattr(model, "bodies", ())])
+        return source
+
     def _is_by_block(self, claim: str, own: Iterable[str]) -> bool:
         return is_by_block(claim, own=self._vocabulary.own | {*own})
 
@@ -101,7 +114,7 @@ class Statements:
         """What a definition says, in the words that it sees."""
 
         def expression(text: str) -> Any:
-            found = self._fitting(spelled(text), text, text, vocabulary)
+            found = self._fitting(self._spelled(text), text, text, vocabulary)
             if found.rhs is not None:
                 raise ParseError(f"{name} := {text} is a statement: a letter stands for one expression")
             return found.lhs
@@ -129,7 +142,7 @@ class Statements:
             raise kind(f"{claim!r} does not read as a statement of operators.\n{why}{place}")
         first = found[0]
         if len(found) == 2 and not (_same(first.lhs, found[1].lhs) and _same(first.rhs, found[1].rhs)):
-            shown = "\n".join(f"  {s.reading}: {_text(s.lhs)} = {_text(s.rhs)}" for s in found)
+            shown = "\n".join(f"  {s.reading}: {_text(s.lhs)} {s.relation} {_text(s.rhs)}" for s in found)
             raise ParseError(f"{claim!r} reads in two ways and both fit:\n{shown}\nwrite .T for a transpose, or juxtapose to multiply")
         if vocabulary.used:
             used = reversed(vocabulary.used.items())
@@ -140,12 +153,18 @@ class Statements:
 
     def _read(self, source: Spelled, text: str, reading: str, vocabulary: Vocabulary) -> Statement:
         read_sides = self._read_python if reading == "Python" else read_book
-        sides = read_sides(as_logarithms(source.text), vocabulary)
+        relation, parts = related(source.text)
+        if relation == "=":
+            sides = read_sides(as_logarithms(source.text), vocabulary)
+        else:
+            sides = [_side(read_sides, part, at, vocabulary) for part, at in parts]
         lhs, rhs = sides if len(sides) == 2 else (sides[0], None)
         lhs, rhs = _balance(lhs, rhs), _balance(rhs, lhs) if rhs is not None else None
         if rhs is not None:
             _check_same_spaces(lhs, rhs)
-        return Statement(lhs, rhs, text, reading)
+        if relation != "=":
+            check_comparable(lhs, rhs, relation)
+        return Statement(lhs, rhs, text, reading, relation=relation)
 
     # ------------------------------------------------------------------ Python's reading: Python's own parser
     def _read_python(self, source: str, vocabulary: Vocabulary) -> list[Any]:
@@ -157,7 +176,7 @@ class Statements:
             raise ParseError(f"not understood at {source[max(0, (getattr(error, 'offset', 1) or 1) - 1) :][:12]!r}") from None
         if isinstance(tree, ast.Compare):
             if len(tree.ops) != 1 or not isinstance(tree.ops[0], ast.Eq):
-                raise ParseError("a statement is lhs == rhs")
+                raise ParseError("a statement is lhs == rhs, or one of >, ≥, <, ≤ between two sides")
             return [self._evaluate(tree.left, source, vocabulary), self._evaluate(tree.comparators[0], source, vocabulary)]
         return [self._evaluate(tree, source, vocabulary)]
 
@@ -186,6 +205,15 @@ class Statements:
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in WITH_ARGUMENTS:
                 return vocabulary.indexed(name, [ast.unparse(a) for a in arguments])
         raise ParseError(f"{ast.unparse(node)!r} is no operator expression")
+
+
+def _side(read_sides: Callable[..., list[Any]], part: str, begin: int, vocabulary: Vocabulary) -> Any:
+    """One side of an inequality, which begins at a character of the spelled text."""
+    try:
+        (side,) = read_sides(part, vocabulary)
+    except Misread as error:
+        raise Misread(error.message, error.at + begin) from None
+    return side
 
 
 def _comparison(source: str) -> str:

@@ -1,4 +1,4 @@
-"""Reports: what was found for every theorem (`soa.check`) and for a user's own statement (`pycraft.check`)."""
+"""Reports of findings for every theorem (`soa.check`) and for a user's own statement (`pycraft.check`)."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from .terminal_report import WIDTH, findings_lines, findings_table, monospace, p
 
 UNDEFINED = "undefined"
 OPEN = ("fails", "undecided", "undefined")
-"""Verdicts that say that something is wrong, or not known."""
+"""Verdicts for which something is wrong or unknown."""
 SHOWN = 1e-6
-"""Of what holds no residual is shown whose bound is larger."""
+"""Residuals of statements that hold are not shown if their bound is larger."""
 PASSED = ("holds", "expected to fail", "holds anyway", "waiting")
-"""Verdicts that say that nothing is wrong; only the first says that something was shown."""
+"""Verdicts for which nothing is wrong; only the first means that the statement was shown."""
 
 
 @dataclass
 class Finding:
-    """What was found for one theorem: the verdict, and the residual and bound that it rests on.
+    """Finding for one theorem: the verdict, and the deciding residual and bound.
 
     Verdicts: "holds", "fails", "undecided" (no scalar up to the widest decides), "expected to fail" (outside its hypotheses, and it
-    does, or asks for an inverse that does not exist: then `note` says so and there is no residual), "holds anyway" (outside its
+    does, or needs an inverse that does not exist: then `note` states it and there is no residual), "holds anyway" (outside its
     hypotheses, and it does not fail), "undefined" (an inverse in it does not exist), "waiting" (not evaluated yet).
 
-    `residual` and `bound` are the largest in double, `wide_residual` and `wide_bound` those of the deciding state in `wide_precision`,
-    the scalar that decided. They are relative to the larger side, of numbers to their terms.
+    `residual` and `bound` are the largest in double, `wide_residual` and `wide_bound` belong to the deciding state in `wide_precision`,
+    the deciding scalar. They are relative to the larger side, or for numbers to their terms.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Finding:
     note: str = ""
 
     def judged(self, found: Verdict) -> None:
-        """Take over what was found at some states."""
+        """Record the findings at some states."""
         decisive = found.shown.decisive
         self.verdict, self.states = found.verdict, found.states
         self.residual, self.bound = found.residual, found.bound
@@ -60,7 +60,7 @@ class Finding:
 
     @property
     def in_double(self) -> str:
-        """The residual in double, nothing where double says nothing: its bound is large, or both sides are zero but for rounding."""
+        """The residual in double; empty if double does not decide, because the bound is large or both sides are only rounding."""
         return f"{self.residual:.1e}" if self.verdict == FAILS or self.residual <= self.bound <= SHOWN else ""
 
     @property
@@ -75,9 +75,9 @@ class Finding:
 class Report:
     """The findings on one model.
 
-    As a condition: true if all that should hold does, false if something fails that should hold, or is undefined, or if nothing holds
-    at all: what was not shown is not true; UndecidedError where nothing fails and something is undecided. `.status` says the same as an
-    exit status, 0, 1 (something fails) or 3 (something was not shown). Printed, it is the summary and a line for each exception;
+    As a condition: true if everything holds that should, false if something that should hold fails or is undefined, or if nothing holds
+    at all (a statement that was not shown is not true); UndecidedError if nothing fails and something is undecided. `.status` is the same
+    as an exit status, 0, 1 (something fails) or 3 (something was not shown). It prints as the summary and a line for each exception;
     `.lines()` has a line for every theorem, `.full()` the long form. `report[name]` is the finding of one theorem.
     """
 
@@ -93,12 +93,12 @@ class Report:
 
     @property
     def status(self) -> int:
-        """0 where all that should hold does, 1 where something fails, 3 where nothing fails and something was not shown, or nothing was."""
+        """0 if everything holds that should, 1 if something fails, 3 if nothing fails but something, or everything, was not shown."""
         return 1 if self.failed else 3 if self.undecided or self.undefined or not self._held else 0
 
     @property
     def worst(self) -> float:
-        """The largest residual of what holds, in the scalar that decided."""
+        """The largest residual of findings that hold, in the deciding scalar."""
         return max((f.wide_residual for f in self._held), default=0.0)
 
     @property
@@ -115,7 +115,7 @@ class Report:
 
     @property
     def undefined(self) -> list[Finding]:
-        """What should hold, and asks for an inverse that does not exist on the model."""
+        """Findings that should hold but need an inverse that does not exist on the model."""
         return [f for f in self.findings if f.verdict == UNDEFINED]
 
     def counts(self) -> dict[str, int]:
@@ -134,25 +134,25 @@ class Report:
         for found in self.findings:
             if found.name == name:
                 return found
-        raise KeyError(f"no theorem is called {name!r}; .findings has all, each with its name")
+        raise KeyError(f"no theorem is called {name!r}; .findings lists all by name")
 
     @property
     def exceptions(self) -> list[Finding]:
-        """What does not simply hold."""
+        """Findings other than "holds"."""
         return [f for f in self.findings if f.verdict not in (HOLDS, "holds anyway")]
 
     def table(self) -> Any:
-        """The findings as a rich table, the long form."""
+        """Return the findings as a rich table, the long form."""
         return findings_table(self.findings)
 
     def lines(self, width: int = WIDTH) -> Any:
-        """The findings as a rich text, one line a theorem and the verdict first; what does not simply hold comes before the others."""
+        """Return the findings as a rich text, one line per theorem with the verdict first; exceptions come before the others."""
         exceptions = self.exceptions
         parts = [exceptions, [f for f in self.findings if f not in exceptions]]
         return Text("\n").join(findings_lines(part, width) for part in parts if part)
 
     def summary(self) -> str:
-        """How many of each verdict, in one or two lines; what is wrong comes first."""
+        """Return the count of each verdict, in one or two lines; failures come first."""
         counts = self.counts()
         order = sorted(counts, key=lambda verdict: (verdict not in OPEN, verdict == "waiting", -counts[verdict]))
         known = f"{self.seconds:.1f} s"
@@ -166,7 +166,7 @@ class Report:
         return "\n".join(map(wrapped, (found, *known.split("\n"))))
 
     def full(self) -> str:
-        """Every theorem in the long form as text, in 80 columns."""
+        """Return every theorem in the long form as text, in 80 columns."""
         return f"{self.summary()}\n\n{text_of(self.table())}"
 
     def __repr__(self) -> str:
@@ -180,10 +180,10 @@ class Report:
 
 @dataclass
 class CheckReport:
-    """The outcome of `pycraft.check`: true as a condition where the statement holds at every state, false where it fails at one.
+    """The outcome of `pycraft.check`: true as a condition if the statement holds at every state, false if it fails at one.
 
-    Where neither is seen in the widest scalar, its `verdict` is "undecided" and as a condition it raises UndecidedError: what is not
-    decided is not true. Where an inverse in it does not exist on the model and would where J > 0, it is "undefined", and false as a
+    If the widest scalar decides neither, its `verdict` is "undecided", and as a condition it raises UndecidedError: an undecided statement
+    is not true. If an inverse in it does not exist on the model but would with J > 0, it is "undefined", and false as a
     condition. `.counterexample` is the smallest refutation found of a false statement.
     """
 
@@ -196,22 +196,22 @@ class CheckReport:
     states: int
     models: list[str]
     precision: str | int = "extended"
-    """The scalar that decided, the widest that was needed."""
+    """The deciding scalar, the widest that was needed."""
     residual: float = 0.0
     residual_bound: float = 0.0
-    """The residual and the bound in that scalar, at the state that decided."""
+    """The residual and the bound in that scalar, at the deciding state."""
     counterexample: Any = None
     true_where: list[frozenset[str]] = field(default_factory=list)
-    """Standard hypotheses under which a false statement is true, the weakest first; each set is enough."""
+    """Standard hypotheses under which a false statement is true, weakest first; each set suffices."""
     untried: bool = False
-    """Whether the search for those hypotheses ended before each was tried."""
+    """True if the search for these hypotheses ended before all were tried."""
     notes: list[str] = field(default_factory=list)
     understood: str = ""
-    """How the text was read, in the package's own letters; empty where expressions were given."""
+    """The text as read, in the package's own letters; empty if expressions were given."""
 
     @classmethod
     def of(cls, statement: str, found: Verdict, models: list[str], understood: str = "") -> CheckReport:
-        """The report of a verdict."""
+        """Return the report of a verdict."""
         decisive = found.shown.decisive
         report = cls(statement, found.verdict, found.residual, found.bound, found.states, models, understood=understood)
         report.precision, report.residual, report.residual_bound = decisive.precision, decisive.residual, decisive.bound
@@ -255,7 +255,7 @@ class CheckReport:
         return statement_html(self)
 
     def details(self) -> list[str]:
-        """What the report says below the statement, line by line."""
+        """Return the lines of the report below the statement."""
         on = self.models[0] if len(self.models) == 1 else f"{len(self.models)} models"
         lines = read_as(self.statement, self.understood)
         if self.verdict == FAILS:

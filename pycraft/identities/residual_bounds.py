@@ -1,15 +1,15 @@
-"""How large a residual may be: a bound from sizes, norms and epsilon, derived and not tuned to what was measured.
+"""Bounds on residuals from sizes, norms and epsilon, derived instead of fitted to measurements.
 
 A product F₁F₂…Fₘ is applied factor by factor. The rounding of step i is at most a few eps times ‖Fᵢ‖‖Fᵢ₊₁…Fₘ‖ and reaches the result
 through F₁…Fᵢ₋₁; so the product is off by at most
 
     c · eps · m · maxᵢ ‖F₁…Fᵢ₋₁‖ ‖Fᵢ‖ ‖Fᵢ₊₁…Fₘ‖
 
-with c the number of roundings that an entry meets in one sweep: six products a body, along a path of the tree. A resolvent φ rounds at
-every body of the sweep: ‖F₁…φ‖‖E‖‖φ…Fₘ‖. An inverse X⁻¹ passes the error of X on: ‖F₁…X⁻¹‖ size(X) ‖X⁻¹…Fₘ‖. A sum adds. Values of the
+with c the number of roundings of an entry in one sweep: six products per body, along a path of the tree. A resolvent φ rounds at
+every body of the sweep: ‖F₁…φ‖‖E‖‖φ…Fₘ‖. An inverse X⁻¹ propagates the error of X: ‖F₁…X⁻¹‖ size(X) ‖X⁻¹…Fₘ‖. A sum adds. Values of the
 Riccati sweep (P, D, G, K, ψ, Υ, Ω) carry that sweep's rounding: the downdate P⁺ = P - GDG* rounds at the size of P, so D(k) at that of
-H(M + EPE*)H* + J, the inertia it would have with the next hinges outboard locked. Its terms may be larger than itself, far from the
-hinge; see `Sizes.amplification`. The largest ratio of that to D amplifies, in the frame in which each
+H(M + EPE*)H* + J, the inertia with the next outboard hinges locked. Its terms may be larger than itself, far from the
+hinge; see `Sizes.amplification`. The amplification is the largest ratio of this inertia to D, in the frame in which each
 sweep is made. Residuals are judged relative to the larger side, numbers relative to their terms.
 """
 
@@ -26,7 +26,7 @@ from .vocabulary import is_number
 EPSILON = _core.epsilons()
 """Epsilon of each precision by name."""
 CONSTANT = 4.0
-"""Roundings per product that the count above leaves out: forming the entry of a letter, adding it up, two sides."""
+"""Roundings per product not counted above: forming the entry of a letter, adding it up, two sides."""
 
 _NUMBERS = _core.euclidean(1)
 """The domain of a vector."""
@@ -34,10 +34,10 @@ _RICCATI = {"P", "P_plus", "D", "G", "K", "tau", "tau_bar", "E_psi", "psi", "psi
 
 
 class Sizes:
-    """Norms of expressions at one state, remembered; and what rounding makes of them.
+    """Cached norms of expressions at one state, and their rounding errors.
 
-    With `double` the norms of what is small are those of dense matrices of its parts: there are as many products as places in a
-    statement, and to plan each of them takes longer. What rounding can make of such a matrix is counted along with it, and is added to
+    With `double`, norms of small expressions come from dense matrices of their parts: there are as many products as places in a
+    statement, and planning each of them takes longer. The rounding error of such a matrix is counted along with it, and added to
     its norm.
     """
 
@@ -51,13 +51,13 @@ class Sizes:
         self._vectors: dict[str, Any] = {}
 
     def give(self, vectors: dict[str, Any]) -> None:
-        """The values of named vectors from here on."""
+        """Set the values of named vectors from here on."""
         if vectors != self._vectors:
             self._vectors = vectors
             self._norms_with_vectors.clear()
 
     def norm(self, operator: _core.Operator) -> float:
-        """Frobenius norm, estimated by a few random vectors where the operator is large."""
+        """Return the Frobenius norm, estimated by a few random vectors if the operator is large."""
         if operator.kind == "identity":
             return float(np.sqrt(operator.shape[0]))
         if operator not in self._norms:
@@ -75,7 +75,7 @@ class Sizes:
         return max(0.0, norm - off) if self._least else norm + off
 
     def of_sides(self, lhs: Any, rhs: Any) -> tuple[float, bool]:
-        """(the size of both sides, whether it is known to be that to a factor of two)."""
+        """Return the size of both sides, and True if it is known to a factor of two."""
         self._uncounted = self._rough = False
         size = self.size(lhs) + self.size(rhs)
         counted = not self._uncounted
@@ -86,7 +86,7 @@ class Sizes:
         return size, counted
 
     def _norm(self, operator: _core.Operator) -> tuple[float, float | None]:
-        """The norm of an expression, and what its rounding may be where that is counted."""
+        """Return the norm of an expression, and its rounding error if it is counted."""
         n = operator.shape[1]
         if n > PROBE_ABOVE:
             return float(np.linalg.norm(self._bind(operator) @ probes(n)) / np.sqrt(PROBES)), None
@@ -95,11 +95,11 @@ class Sizes:
                 matrix, off = self._matrix(operator)
                 return float(np.linalg.norm(matrix)), off
             except (_core.SingularOperatorError, _core.SingularHingeError):
-                pass  # a part may have no value where the whole has one
+                pass  # a part may have no value although the whole has one
         return float(self._bind(operator).norm()), None
 
     def _matrix(self, operator: _core.Operator) -> tuple[np.ndarray, float]:
-        """The matrix of an expression from those of what it is made of, and how far off it may be, as a norm."""
+        """Return the matrix of an expression from the matrices of its parts, and its possible error, as a norm."""
         if operator not in self._matrices:
             self._matrices[operator] = self._made(operator)
         return self._matrices[operator]
@@ -130,7 +130,7 @@ class Sizes:
         return made, float(off)
 
     def _off(self, operator: _core.Operator, norm: float, inner: float) -> float:
-        """How far off the value of an operator that is no product or sum may be: by its own sweep, and by `inner` of its operand."""
+        """Return the possible error of an operator that is not a product or sum: from its own sweep, and from `inner` of its operand."""
         match operator.kind:
             case "inverse":
                 return norm**2 * inner
@@ -144,10 +144,10 @@ class Sizes:
         return CONSTANT * max([6.0, *(sweep(s) for s in sources(operator))]) * EPSILON["double"] * growth * norm
 
     def _norm_with_vectors(self, operator: _core.Operator) -> float:
-        # A column is told by its space: a row on a model of one degree of freedom has one column as well.
+        # A column is recognized by its space: a row on a model of one degree of freedom also has one column.
         if _NUMBERS not in (operator.domain, operator.codomain):
             norms = [self.norm(c) for c in operator.children]
-            match operator.kind:  # an outer product, or what is made of some: at most
+            match operator.kind:  # an outer product, or a sum of some: at most
                 case "product":
                     return float(np.prod(norms))
                 case "sum":
@@ -162,7 +162,7 @@ class Sizes:
         return float(np.linalg.norm(self._bind(column).value(**self._vectors)))
 
     def size(self, side: Any) -> float:
-        """The error of a side per unit of c · eps."""
+        """Return the error of a side per unit of c · eps."""
         if is_number(side):
             return abs(float(side))
         if isinstance(side, _core.Scalar):
@@ -181,7 +181,7 @@ class Sizes:
                 return self._step([side], 0)
 
     def _step(self, factors: list[_core.Operator], i: int) -> float:
-        """What the rounding of factor i makes of the product."""
+        """Return the effect of the rounding of factor i on the product."""
         factor = factors[i]
         base = factor.children[0] if factor.kind == "transpose" else factor
         if base.kind in ("sum", "scaled", "product"):
@@ -224,7 +224,7 @@ class Sizes:
         return self.size(operand)
 
     def terms(self, side: _core.Scalar) -> float:
-        """The size of what a number is a sum of: the diagonal of a trace, one for a logarithm, by which a relative error moves it."""
+        """Return the size of the terms of a number: the diagonal of a trace, one for a logarithm, scaling a relative error."""
         kind, value, operand, terms = side.kind, side.number, side.operand, side.terms
         if operand is None:
             if not terms:
@@ -251,7 +251,7 @@ class Sizes:
             rows = np.abs(np.asarray(self._bind(H) @ columns, float))
             largest = (columns * locked[:, None]).max(axis=0, initial=0.0)
             bodies = {body: where for _, where, body in M.codomain.blocks}
-            reach = rows @ largest  # where hinges are not numbered as the bodies are
+            reach = rows @ largest  # hinges may be numbered differently from bodies
             for _, hinge, body in H.codomain.blocks if len(bodies) == len(H.codomain.blocks) else ():
                 reach[hinge] = rows[hinge, : bodies[body].stop - bodies[body].start] @ locked[bodies[body]]
             felt = reach**2 + self._diagonal(J)
@@ -263,7 +263,7 @@ class Sizes:
 
 
 def sweep(source: Any) -> float:
-    """Roundings that an entry meets in one sweep: six products a body along the longest path to the base."""
+    """Return the number of roundings of an entry in one sweep: six products per body along the longest path to the base."""
     depth: list[int] = []
     for parent in source.parents:
         depth.append(depth[parent] + 1 if parent >= 0 else 1)
@@ -275,19 +275,19 @@ def _has_vectors(operator: _core.Operator) -> bool:
 
 
 PROBE_ABOVE = 400
-"""Columns up to which operators are compared entry by entry; larger ones are compared on random vectors."""
+"""Largest number of columns of operators compared entry by entry; larger ones are compared on random vectors."""
 PROBES = 8
 DENSE_BELOW = 120
-"""Rows and columns up to which the dense matrix of a product costs less than its plan."""
+"""Largest size for which the dense matrix of a product costs less than its plan."""
 
 
 def probes(dimension: int) -> np.ndarray:
-    """Random vectors of signs (dimension, PROBES): the mean of |Ax|² over them is the squared Frobenius norm."""
+    """Return random vectors of signs (dimension, PROBES): the mean of |Ax|² over them is the squared Frobenius norm."""
     return np.random.default_rng(dimension).choice([-1.0, 1.0], (dimension, PROBES))
 
 
 def sources(side: Any, riccati: bool = False) -> list[Any]:
-    """The models whose letters a side mentions; only values that the Riccati sweep makes, if `riccati`."""
+    """Return the models of a side's letters; with `riccati`, only of letters from the Riccati sweep."""
     if isinstance(side, _core.Scalar):
         return [s for e in side.operands() for s in sources(e, riccati)]
     if not isinstance(side, _core.Operator):
@@ -298,14 +298,14 @@ def sources(side: Any, riccati: bool = False) -> list[Any]:
 
 
 class Roundings:
-    """What rounding can make of the difference of two sides, from norms at one state.
+    """Possible effect of rounding on the difference of two sides, from norms at one state.
 
     Attributes
     ----------
-    size : the errors of both sides per unit of c · eps, without what the Riccati sweep makes of them
-    terms : of numbers, the size of what they are sums of; 0 of operators
-    growth : what the Riccati sweep makes of its roundings, 1 where no side mentions a value of it
-    counted : whether the size is that, to a factor of two, for all that rounding can make of the norms
+    size : errors of both sides per unit of c · eps, without the amplification by the Riccati sweep
+    terms : for numbers, the size of their terms; 0 for operators
+    growth : amplification of roundings by the Riccati sweep, 1 if no side has a letter from it
+    counted : True if the size is correct to a factor of two, including rounding of the norms
     """
 
     def __init__(self, lhs: Any, rhs: Any, sizes: Sizes):
@@ -315,9 +315,9 @@ class Roundings:
         self._sweep = max([6.0, *(sweep(s) for s in dict.fromkeys(sources(lhs) + sources(rhs)))])
 
     def absolute(self, precision: str | int) -> float:
-        """The bound on |lhs - rhs| itself."""
+        """Return the bound on |lhs - rhs| itself."""
         return CONSTANT * self._sweep * EPSILON[precision] * self.size * self.growth
 
     def bound(self, relative_size: float, precision: str | int) -> float:
-        """The bound on |lhs - rhs| over a scale, `relative_size` the size over that scale."""
+        """Return the bound on |lhs - rhs| over a scale; `relative_size` is the size over that scale."""
         return CONSTANT * self._sweep * EPSILON[precision] * max(1.0, relative_size) * self.growth

@@ -21,7 +21,8 @@ from ..state import State
 from .budget import Budget
 from .drawn_vectors import drawn_vectors
 from .family import DOF, HYPOTHESES, Spec, family, named_vectors, read_on
-from .judge import FAILS, BoundState, Verdict, judge, ladder
+from .inequalities import judge_read
+from .judge import FAILS, BoundState, Verdict, ladder
 from .statement_text import telling_of
 from .terminal_report import wrapped
 
@@ -130,7 +131,7 @@ def judged(
     for state in spec.states(model, states):
         drawn = drawn_vectors(read.rhs, rng, drawn_vectors(read.lhs, rng, {}))
         try:
-            found.judgements.append(judge(read.lhs, read.rhs, BoundState(model.soa, state), drawn, **options))
+            found.judgements.append(judge_read(read, BoundState(model.soa, state), drawn, **options))
         except ArithmeticError:
             continue
         if found.judgements[-1].verdict == FAILS:

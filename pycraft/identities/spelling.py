@@ -106,6 +106,7 @@ _LAYOUT = _rules(
         (r"\\(?=\s)", " "),
         (r"\\(lbrack|\{)", "("),
         (r"\\(rbrack|\})", ")"),
+        (r"\\partial\s*_\s*\{\s*\\(?:mathrm|text)\s*\{\s*mass\s*\}\s*\}", " ∂_mass "),
         (r"_\{\\(?:mathrm|text|textrm|mathit)\{((?:[^{}\\]|\\.)+)\}\}", _arguments),
         (r"\\(?:operatorname\*?|mathrm|text|textrm|textnormal|mathsf|mathit|mathbf)\s*\{\s*([A-Za-z]{2,})\s*\}", _word),
         (r"\\(?:ln|log)(?![A-Za-z])", " ln "),
@@ -237,7 +238,10 @@ _EXPONENTS = _rules(
 )
 
 _FRACTIONS = {"½": "(1/2)", "⅓": "(1/3)", "⅔": "(2/3)", "¼": "(1/4)", "¾": "(3/4)"}
-_SIGNS = {"−": "-", "–": "-", "×": "·", "⋅": "·", "∙": "·", "∘": "·", "•": "·", "∗": "*", "⋆": "*", "≡": "=", "≜": "=", "≝": "=", "∆": "Δ"}
+_SIGNS = {
+    "−": "-", "–": "-", "×": "·", "⋅": "·", "∙": "·", "∘": "·", "•": "·", "∗": "*", "⋆": "*", "≡": "=", "≜": "=", "≝": "=", "∆": "Δ",
+    "≻": ">", "⪰": "≥", "≽": "≥", "⩾": "≥", "≺": "<", "⪯": "≤", "≼": "≤", "⩽": "≤",
+}  # fmt: skip
 # Letters of other alphabets that stand for the book's: the symbol forms of φ, θ, Υ.
 _VARIANTS = {"ϕ": "φ", "ϑ": "θ", "ϒ": "Υ", "Ω": "Ω", "𝓜": "ℳ", "𝒱": "V", "𝟙": "I"}
 
@@ -310,7 +314,8 @@ _UNICODE = _rules(
         (r"[\u00c0-\u024f\u1e00-\u1eff]", _apart),
         (r"Λ\u0332", "Λ"),
         (r"a_0(?!\d)", "a₀"),
-        (r"θ\u0308_([fp])(?![a-z])", r" vdot_\1 "),
+        (r"θ\u0308_([fpr])(?![a-z])", r" vdot_\1 "),
+        (r"θ\u0307_r(?![a-z])", " theta_dot_r "),
         (r"θ(?:\u0308|\s*_ddot(?![A-Za-z]))", " vdot "),
         (r"θ\s*_dot(?![A-Za-z])", " theta_dot "),
         (r"(?<![A-Za-z])d\s*/\s*dt(?![A-Za-z])", "∂_t"),
@@ -320,6 +325,7 @@ _UNICODE = _rules(
         (r"∂((?:[^/∂=;,()]|\((?:[^()]|\([^()]*\))*\))+)/\s*∂\s*θ\s*_\s*([a-n])(?![A-Za-z])", r"(∂_\2(\1))"),
         (r"∂_θ_([a-n])(?![A-Za-z])", r"∂_\1"),
         (r"Δ\s*_\s*t(?!heta)|(?<![A-Za-z_])Delta_t(?![A-Za-z_])", " Delta_theta_dot "),
+        (r"Δ\s*_\s*X(?![a-z])", " Delta_X "),
         (r"Δ\s*_\s*([a-n])(?![a-z0-9])", r" Delta(\1) "),
         (r"(?<![A-Za-z_])Delta_([a-n])(?![A-Za-z_])", r" Delta(\1) "),
     ]
@@ -332,12 +338,14 @@ _NAMES = _rules(
         ),
         ("|".join(map(re.escape, _SIGNS)), lambda m: _SIGNS[m[0]]),
         (r":=", "="),
+        (r">=", "≥"),
+        (r"<=(?!=)", "≤"),
         (r"‖([^‖]*)‖|\|\|([^|]*)\|\|", lambda m: f" norm({m[1] or m[2]}) "),
         # what bears an accent that makes no letter of the table: first those of two characters, φ̃ with a dot
         (rf"([^\W\d_](?:\u0303|\u0304|\u0307)?){_SUBSCRIPT}([{''.join(_ACCENT_NAMES)}]+){_SUBSCRIPT}", _only_others),
         *((_no_combining(letter), name) for letter, name in _LETTERS),
         (rf"([{''.join(_OTHER_GREEK)}]){_SUBSCRIPT}", lambda m: f" {_OTHER_GREEK[m[1]]}{m[2]} "),
-        (r"\s+(?=_(?:(?:dot|ddot|tilde|bar|hat|plus)(?![A-Za-z])|(?:ff|fp|pf|pp|f|p)(?![a-z])))", ""),
+        (r"\s+(?=_(?:(?:dot|ddot|tilde|bar|hat|plus)(?![A-Za-z])|(?:ff|fp|pf|pp|[fpwcnrgsSJ2])(?![a-z0-9])))", ""),
         (r"(?<![A-Za-z_])(?:ln|log)\s*\|\s*det\s*(\([^|]*\)|\[[^|]*\]|[^|]*)\|", lambda m: f" logdet({m[1]}) "),
         (r"(?<![A-Za-z_])(?:ln|log)\s*(?:\(\s*det\s*\(([^()]*)\)\s*\))", r" logdet(\1) "),
         (r"(?<![A-Za-z_])(?:ln|log)\s*\|?\s*det(?![A-Za-z_])", " logdet "),
@@ -349,7 +357,7 @@ _NAMES = _rules(
 )
 
 
-_OF_COORDINATE = re.compile(r"(?<=∂_)[a-n](?![a-z0-9_])|(?<=Delta\()[a-n](?=\))")
+_OF_COORDINATE = re.compile(r"(?<=∂_)[a-n](?![a-z0-9_])|(?<=Delta\()[a-n](?=\))|(?<=(?<![a-z])e_)[a-n](?![A-Za-z0-9_])")
 
 
 def _rename_indices(spelled: Spelled) -> None:
@@ -357,6 +365,14 @@ def _rename_indices(spelled: Spelled) -> None:
     found = list(dict.fromkeys(_OF_COORDINATE.findall(spelled.text)))
     if len(found) <= 2 and not {*found} <= {"i", "j"}:
         spelled.rewrite((_OF_COORDINATE, lambda m: "ij"[found.index(m[0])]))
+
+
+def stars_behind_nodes(source: Spelled, names: Iterable[str]) -> None:
+    """B*(node0) as B(node0)*: a star between a letter of nodes and the names, or numbers, of nodes."""
+    node = "|".join([r"\d+", *(re.escape(name) for name in sorted(names, key=len, reverse=True))])
+    node = rf"\s*['\"]?(?:{node})['\"]?\s*"
+    pattern = rf"(?<![A-Za-z_])(B|Jacobian|Lambda)\s*(\^\s*\*|\^\s*T(?![A-Za-z])|\*|'|\.T)\s*(\({node}(?:,{node})*\))"
+    source.rewrite((re.compile(pattern), r"\1\3^*"))
 
 
 @lru_cache(maxsize=256)

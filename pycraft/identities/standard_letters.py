@@ -20,16 +20,17 @@ class StandardLetter:
 
 
 _RATE = "(phi^*(Delta_theta_dot^* phi_tilde^* H^* + H_dot^*))"
-_CHRISTOFFEL = f"H phi (M {_RATE} + (1/2)(momentum_cross + V_bar M + M V_tilde) phi^* H^*)"
+_CHRISTOFFEL = f"H phi (M {_RATE} + (1/2)(momentum_cross + V_bar M + M V_tilde) phi^* H^*) + C_J"
+_CORIOLIS = "H phi (M phi^* a + b) + b_J"
 
 STANDARD = {
-    "T": StandardLetter("T", "hinge forces", ("H f + J vdot",)),
+    "T": StandardLetter("T", "hinge forces", ("H f + J vdot + b_J",)),
     "alpha": StandardLetter("α", "body accelerations", ("phi^*(H^* vdot + a)",)),
     "f": StandardLetter("f", "interbody forces", ("phi(M alpha + b)",)),
-    "C": StandardLetter("C", "Coriolis and gyroscopic hinge forces, or the Coriolis matrix", ("H phi (M phi^* a + b)", _CHRISTOFFEL)),
-    "C_force": StandardLetter("𝒞", "Coriolis and gyroscopic hinge forces", ("H phi (M phi^* a + b)", _CHRISTOFFEL)),
-    "z": StandardLetter("z", "residual forces of the articulated-body algorithm", ("psi(K T + P a + b)",)),
-    "epsilon": StandardLetter("ε", "innovations forces", ("T - H z",)),
+    "C": StandardLetter("C", "Coriolis and gyroscopic hinge forces, or the Coriolis matrix", (_CORIOLIS, _CHRISTOFFEL)),
+    "C_force": StandardLetter("𝒞", "Coriolis and gyroscopic hinge forces", (_CORIOLIS, _CHRISTOFFEL)),
+    "z": StandardLetter("z", "residual forces of the articulated-body algorithm", ("psi(K (T - b_J) + P a + b)",)),
+    "epsilon": StandardLetter("ε", "innovations forces", ("T - b_J - H z",)),
     "nu": StandardLetter("ν", "innovations accelerations", ("D^-1 epsilon",)),
     "xi": StandardLetter("ξ", "innovations velocities", ("(I + H phi K)^* theta_dot",)),
     "p": StandardLetter("p", "momenta of all bodies outboard", ("phi M velocity",)),

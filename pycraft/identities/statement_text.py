@@ -1,4 +1,4 @@
-"""A statement as text again, and the numbers in it: which of them a check has to tell apart."""
+"""Conversion of a statement to text, and the numbers in it that a check must distinguish."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .parse import Statement
 from .vocabulary import decimal, is_number
 
 TELLS = 1e-3
-"""A bound of this part of the distance of two numbers tells them apart, also in a term that is a small part of the sides."""
+"""A bound below this fraction of the distance of two numbers distinguishes them, also in a small term of the sides."""
 
 
 def statement_text(read: Statement) -> str:
-    """The statement in Python's spelling, to be read on another model."""
+    """Return the statement in Python's spelling, to be read on another model."""
     if read.reading != "expressions":
         return read.text
     return " == ".join(map(_side_text, (read.lhs, read.rhs)))
 
 
 def _side_text(side: Any) -> str:
-    """A side as text; doubles that are not the decimals that they are written as by their ratios."""
+    """Return a side as text; doubles that are not equal to their decimals are written as ratios."""
     if is_number(side):
         return str(Fraction(side))
     in_python = isinstance(side, _core.Operator)
@@ -40,8 +40,8 @@ def _side_text(side: Any) -> str:
 
 
 def telling(*texts: str) -> float:
-    """The largest bound that decides a statement, of which these are the texts: one that tells its numbers apart from each other, from 0
-    and from 1, which stands in front of what has none. Of a and b by |a - b| / max(1, a, b): a sum is mostly of what has no number."""
+    """Return the largest bound that decides a statement with these texts: one that distinguishes its numbers from each other, from 0
+    and from 1, the implied number of other terms. For a and b by |a - b| / max(1, a, b), because most terms have no number."""
     found = {Fraction(0), Fraction(1)}
     for text in texts:
         found |= {decimal(number) for number in re.findall(r"(?<![\w.])[0-9]+\.?[0-9]*(?:[eE][+-]?[0-9]+)?", text)}
@@ -49,5 +49,5 @@ def telling(*texts: str) -> float:
 
 
 def telling_of(read: Statement) -> float:
-    """`telling` of a statement as it is typed and as it was read: 10**-40 is 1e-40."""
+    """Return `telling` of a statement as typed and as read: 10**-40 is 1e-40."""
     return telling(statement_text(read), *(str(side) if is_number(side) else side.text() for side in (read.lhs, read.rhs)))

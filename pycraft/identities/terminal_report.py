@@ -1,4 +1,4 @@
-"""Reports in a terminal: 80 columns, letters as the book has them, what matters never cut."""
+"""Reports in a terminal: 80 columns, the book's letters, important parts never truncated."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ STYLES = {
 
 
 def monospace(text: str) -> str:
-    """The text as a terminal is given it: letters and their accents composed where there is one character for both.
+    """Return the text for a terminal: letters and their accents composed if Unicode has one character for both.
 
-    An accent that has none, as in φ̃, is left: a terminal that knows Unicode sets it on its letter, as pages and notebooks do.
+    Other accents, as in φ̃, are left: a Unicode terminal sets them on their letters, as pages and notebooks do.
     """
     return unicodedata.normalize("NFC", text)
 
 
 def wrapped(line: str, width: int = WIDTH) -> str:
-    """A line broken to the width of a terminal, what follows two further in than its beginning."""
+    """Return a line broken to the width of a terminal, with continuations indented by two."""
     indent = " " * (len(line) - len(line.lstrip()))
     broken = textwrap.wrap(line, width, initial_indent="", subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False)
     return "\n".join(broken) or line
 
 
 def read_as(text: str, understood: str) -> list[str]:
-    """A line that says how a text was read; none where it says so itself."""
+    """Return a line with the text as read; none if it equals the text."""
     plain = "".join(text.split()).replace("==", "=")
     return [] if not understood or "".join(understood.split()) == plain else [f"  read as {monospace(understood)}"]
 
@@ -49,9 +49,9 @@ def precision_text(precision: str | int) -> str:
 
 
 def findings_lines(findings: Sequence[Any], width: int = WIDTH) -> Any:
-    """One line a theorem, the verdict first: its statement, or its name where that has no room, and what it needs where that is not met.
+    """Return one line per theorem, the verdict first: its statement, or its name if that is too long, and its unmet hypotheses.
 
-    Nothing is cut and nothing goes on in a second line; `findings_table` is the long form.
+    Nothing is truncated and no line is continued; `findings_table` is the long form.
     """
     from rich.text import Text
 
@@ -69,7 +69,7 @@ def findings_lines(findings: Sequence[Any], width: int = WIDTH) -> Any:
 
 
 def findings_table(findings: Sequence[Any]) -> Any:
-    """The long form, theorems by group: statement, the residual and bound that decided and in which precision, the verdict."""
+    """Return the long form, theorems by group: statement, the deciding residual and bound and their precision, the verdict."""
     from rich.padding import Padding
     from rich.table import Table
     from rich.text import Text
@@ -95,12 +95,12 @@ def findings_table(findings: Sequence[Any]) -> Any:
             numbers = (f"{f.wide_residual:.1e}", f"{f.wide_bound:.0e}", precision_text(f.wide_precision))
         else:
             numbers = ("", "", "no inverse" if f.verdict in ("expected to fail", "undefined") else "")
-        table.add_row(Padding(statement, (0, 0, 0, 2)), *numbers, verdict)  # set in where it goes on, too: a heading is not
+        table.add_row(Padding(statement, (0, 0, 0, 2)), *numbers, verdict)  # continuations are also indented, unlike a heading
     return table
 
 
 def text_of(renderable: Any, width: int = WIDTH) -> str:
-    """What a terminal of this width shows, without colors."""
+    """Return the display of a terminal of this width, without colors."""
     from rich.console import Console
 
     console = Console(file=StringIO(), width=width, color_system=None, force_jupyter=False)

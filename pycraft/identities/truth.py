@@ -245,7 +245,7 @@ def depth_for(statement: str, vectors: Mapping[str, str] | None = None) -> int:
 
 def _refusal(statement: str, model: Any) -> Exception | None:
     try:
-        Statements(model.soa).read(statement)
+        Statements(model.soa).read(statement, inequalities=True)
     except (_core.EvaluationError, _core.SpaceError, _core.ModelError) as error:
         return error
     return None

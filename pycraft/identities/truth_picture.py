@@ -1,4 +1,4 @@
-"""Truth maps as pictures, in HTML and by Matplotlib: a tile a cell, and in each false one its smallest case, drawn as a tree."""
+"""Truth maps as pictures, in HTML and by Matplotlib: one tile per cell, with the smallest case drawn as a tree in false cells."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ..operators.formula_html import formula_html
 from .verdict_html import BLUE, MARKS, ORANGE, verdict_html
 
 _STEP, _ROW, _MARGIN, _RADIUS = 62.0, 34.0, 10.0, 6.0
-"""Pixels from a body to what it carries, from leaf to leaf, around, and of a body."""
+"""Pixels from a body to its children, from leaf to leaf, of the margin, and of a body."""
 
 
 def truth_html(found: Any) -> str:
-    """A truth map as a table: verdicts, and the smallest cases as trees on their sides, hinges by name, bodies with rotors ringed."""
+    """Return a truth map as a table: verdicts, and the smallest cases as trees on their sides, with hinge names and rings for rotors."""
     rows, columns, cells = _grid(found)
     edge = "border:1px solid rgba(128,128,128,.4);padding:4px 8px;text-align:left;vertical-align:top"
     head = "".join(f'<th style="{edge}">{escape(c)}</th>' for c in ("tree, J, base", *columns))
@@ -36,19 +36,19 @@ def truth_html(found: Any) -> str:
 
 
 def truth_page(found: Any) -> str:
-    """A truth map as a page of its own."""
+    """Return a truth map as a self-contained page."""
     head = "<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><meta name='color-scheme' content='light dark'>"
     return f"{head}<title>{escape(found.statement)}</title><body style='margin:16px'>{truth_html(found)}</body></html>\n"
 
 
 def truth_size(found: Any) -> tuple[float, float]:
-    """Inches of the picture by `truth_plot`."""
+    """Return the size of the picture by `truth_plot`, inches."""
     rows, columns, _ = _grid(found)
     return 2.9 * len(columns) + 1.5, 0.72 * len(rows) + 1
 
 
 def truth_plot(found: Any, ax: Any = None) -> Any:
-    """A truth map as a picture: one tile a cell, with the smallest case in each false one, its tree and its hinges; returns the axes."""
+    """Draw a truth map: one tile per cell, with the tree and the hinges of the smallest case in each false cell; return the axes."""
     import matplotlib.pyplot as plt
 
     rows, columns, cells = _grid(found)
@@ -74,7 +74,7 @@ def truth_plot(found: Any, ax: Any = None) -> Any:
 
 
 def _draw(ax: Any, case: Any, left: float, top: float) -> None:
-    """The tree of a smallest case in the unit tile at (left, top), root to the left."""
+    """Draw the tree of a smallest case in the unit tile at (left, top), root to the left."""
     places = tree_places(case.parents)
     x, y = left + 0.3 + 0.58 * places[:, 1], top + 0.22 + 0.5 * places[:, 0]
     if len(set(case.parents)) < len(case.parents):  # a branch, with names to its right
@@ -86,14 +86,14 @@ def _draw(ax: Any, case: Any, left: float, top: float) -> None:
     ax.plot(x[:-1], y[:-1], "o", color=BLUE, ms=6, zorder=3, **ring)
     leaves = set(range(len(case.parents))) - set(case.parents)
     for k, kind in enumerate(case.kinds):
-        if k in leaves and len(leaves) > 1:  # others stand above and below
+        if k in leaves and len(leaves) > 1:  # others are above and below
             ax.text(x[k] + 0.03, y[k], kind, ha="left", va="center", fontsize=6)
         else:
             ax.text(x[k], y[k] + 0.1, kind, ha="center", va="top", fontsize=6)
 
 
 def _grid(found: Any) -> tuple[list[tuple[str, str, str]], list[str], dict[Any, Any]]:
-    """(rows (shape, J, base), columns (hinges), cells by row and column) of a truth map."""
+    """Return rows (shape, J, base), columns (hinges), and cells by row and column of a truth map."""
     rows = list(dict.fromkeys((c.cell.shape, c.cell.J, c.cell.base) for c in found.cells))
     columns = list(dict.fromkeys(c.cell.hinges for c in found.cells))
     return rows, columns, {((c.cell.shape, c.cell.J, c.cell.base), c.cell.hinges): c for c in found.cells}
@@ -106,7 +106,7 @@ def _cell(cell: Any) -> str:
 
 
 def _case_svg(case: Any, words: str) -> str:
-    """The tree of a smallest case on its side."""
+    """Return the tree of a smallest case on its side."""
     places = tree_places(case.parents)
     depth = round(1 / min(places[:-1, 1], default=1.0))  # a root's place is one over the depth
     leaves = len(set(range(len(case.parents))) - set(case.parents)) or 1

@@ -1,11 +1,11 @@
-"""Verdicts in HTML: a sign and a word in the page's own ink beside a bar of colour, told apart without it, on white and on black."""
+"""Verdicts in HTML: a sign and a word in the page's own ink beside a colour bar, distinguishable without colour, on white and on black."""
 
 from __future__ import annotations
 
 from html import escape
 
 BLUE, GREEN, ORANGE, RED, SKY, GREY = "#0072b2", "#009e73", "#e69f00", "#d55e00", "#56b4e9", "#999999"
-"""Colours that colour-blind readers tell apart [Okabe and Ito 2008]."""
+"""Colours for colour-blind readers [Okabe and Ito 2008]."""
 MARKS = {
     "holds": ("✓", GREEN),
     "true": ("✓", GREEN),
@@ -25,6 +25,6 @@ MARKS = {
 
 
 def verdict_html(verdict: str, words: str = "") -> str:
-    """A verdict with its sign; `words` in place of the verdict's own."""
+    """Return a verdict with its sign; `words` replace the verdict's own."""
     sign, colour = MARKS[verdict]
     return f'<span style="border-left:4px solid {colour};padding-left:6px;white-space:nowrap">{sign} {escape(words or verdict)}</span>'

@@ -1,7 +1,7 @@
 """The words of statements: operators by their typed names, functions, powers; and the errors of text that cannot be read.
 
-A name is looked for among the definitions of the statement, what the caller adds, the letters of the operator table, and those of the
-equations of motion (`standard_letters`), in this order; X_dot is the rate ∂_tX where no letter is called so.
+A name is looked for among the definitions of the statement, what the caller adds, the letters of the operator table, those of the
+equations of motion (`standard_letters`) and of parts (`part_letters`), in this order; X_dot is the rate ∂_tX where no letter is called so.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from .. import _core
 from .any_nodes import any_nodes
 from .directions import COORDINATES, along, coordinates_meant
-from .part_letters import part, part_names, text_of_part
+from .part_letters import OF_ROTORS, PARTS, part, text_of_part
 from .spelling import Spelled
 from .standard_letters import STANDARD
 
@@ -97,7 +97,7 @@ Read = Callable[[str, "Vocabulary", str], Any]
 class Vocabulary:
     """The operators of one model by every name that is typed for them, ℳ, I, N, and what the caller adds.
 
-    `derive(x, "i" | "j" | "t", operators)` is what ∂ makes of an expression; `read` makes one of the text of a definition.
+    `derive(x, direction, operators)` is what ∂ makes of an expression, see `directions.along`; `read` makes one of a definition's text.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class Vocabulary:
         self._own = {"MM": H @ phi @ M @ phi.T @ H.T, "I": operators.I, "N": operators.Theta.dimension}
         self._base = dict(self._own)
         self._own |= {"vdot": _core.vector("vdot", operators.Theta), **(extra or {})}
-        self._operators, self._parts = operators, part_names(operators)
+        self._operators = operators
         self._definitions: tuple[Any, ...] = ()
         self._choice: Mapping[str, int] = {}
         self._seen = math.inf
@@ -148,7 +148,8 @@ class Vocabulary:
     @property
     def names(self) -> set[str]:
         """Names that stand alone, without arguments."""
-        letters = {*_NAMES, *_ALIASES, *STANDARD, *self._parts, *self.own}
+        loops = getattr(self._operators._model, "loops", ())
+        letters = {*_NAMES, *_ALIASES, *STANDARD, *(PARTS if len(loops) else PARTS - {"Q", "A"}), *self.own}
         numbers = {"I", "N"} - {d.name for d in self._definitions}
         return letters | {f"{name}_dot" for name in letters - numbers if not name.endswith("dot")}
 
@@ -166,6 +167,8 @@ class Vocabulary:
             return self._own[name]
         if name in WITH_ARGUMENTS:
             return self._of_any(name)
+        if name == "X" and getattr(self._operators, "_loops_embedded", None) is not None:  # where loops are spoken of
+            return self.operator("X_r")
         if name in _NAMES or _ALIASES.get(name, "vdot") != "vdot":
             return getattr(self._operators, _ALIASES.get(name, name))
         if name in _ALIASES:
@@ -175,10 +178,15 @@ class Vocabulary:
             among = tuple(d for d in self._definitions if d.name in STANDARD and not d.of_the_book)
             scope = dict(definitions=among, own=self._of_the_book())
             return self._defined(name, STANDARD[name].meanings[self._choice.get(name, 0)], scope)
-        if name in self._parts:
+        if name in PARTS:
             what = text_of_part(name)
             scope = dict(definitions=(), own=self._of_the_book())
-            return part(self._operators, name) if what is None else self._defined(name, what, scope)
+            if what is not None:
+                return self._defined(name, what, scope)
+            made = part(self._operators, name)
+            if name in OF_ROTORS:
+                self.used.setdefault(name, (name, made))  # shown by its name
+            return made
         if name.endswith("_dot") and name.removesuffix("_dot") in self.names:
             return self.derivative(self.operator(name.removesuffix("_dot")), "t")
         raise ParseError(self.unknown(name))
@@ -232,10 +240,14 @@ class Vocabulary:
             return self._operators.Delta(coordinates_meant(self._operators)[COORDINATES.index(arguments[0])])
         if name == "Delta":
             return self._operators.Delta(int(arguments[0]) if arguments[0].isdigit() else arguments[0])
-        return getattr(self._operators, name)(arguments)
+        nodes = getattr(self._operators._model, "nodes", {})
+        numbered = [*nodes]
+        return getattr(self._operators, name)(
+            [numbered[int(a)] if a.isdigit() and a not in nodes and int(a) < len(numbered) else a for a in arguments]
+        )
 
     def derivative(self, x: Any, direction: str) -> Any:
-        """∂x along the coordinate i or j, or along time."""
+        """∂x along a direction, see `directions.along`."""
         return self._derive(x, direction, self._operators)
 
     def unknown(self, name: str) -> str:

@@ -88,7 +88,7 @@ def _pairs(targets: Any) -> list[tuple[Any, Any]]:
         pairs = list(targets)
         if all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs):
             return pairs
-    raise _core.ModelError(f"targets: a dictionary {{frame: target}}, or a list of such pairs, not {targets!r:.80}")
+    raise _core.ModelError(f"targets must be a dictionary {{frame: target}}, or a list of such pairs, not {targets!r:.80}")
 
 
 def _keys(given: Any, what: str, known: tuple[str, ...]) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def _rotations(R: np.ndarray, what: str) -> np.ndarray:
 def _tolerance(given: Any, what: str) -> tuple[float, float]:
     pair = np.atleast_1d(_core.real_array(given, what)).tolist()
     if np.ndim(given) > 1 or len(pair) not in (1, 2) or not all(x > 0 and np.isfinite(x) for x in pair):
-        raise _core.ModelError(f"{what}: a positive number for rad and m, or a pair (rad, m), not {given!r}")
+        raise _core.ModelError(f"{what} must be a positive number for rad and m, or a pair (rad, m), not {given!r}")
     return pair[0], pair[-1]
 
 
@@ -146,7 +146,7 @@ def _weights(given: dict[str, Any], angular: np.ndarray, what: str) -> np.ndarra
     """Return the weights of every row, 1/rad or 1/m."""
     pair = np.atleast_1d(_core.real_array(given.get("weight", 1.0), f"weight of the {what}")).tolist()
     if len(pair) not in (1, 2) or not all(x > 0 and np.isfinite(x) for x in pair):
-        raise _core.ModelError(f"weight of the {what}: a positive number, or a pair (1/rad, 1/m), not {given['weight']!r}")
+        raise _core.ModelError(f"weight of the {what} must be a positive number, or a pair (1/rad, 1/m), not {given['weight']!r}")
     if not all(WEIGHTS[0] <= x <= WEIGHTS[1] for x in pair):
         raise _core.ModelError(f"weight of the {what}: from {WEIGHTS[0]:.0e} to {WEIGHTS[1]:.0e}, not {given['weight']!r}")
     return np.where(angular, pair[0], pair[-1])
@@ -157,7 +157,7 @@ def _chosen(given: dict[str, Any], possible: tuple[str, ...], what: str) -> list
         return list(possible)
     named = several(directions)
     if not named or len(set(map(str, named))) < len(named) or any(one not in possible for one in map(str, named)):
-        raise _core.ModelError(f"directions of the {what}: different ones of {', '.join(possible)}, not {named!r:.80}")
+        raise _core.ModelError(f"directions of the {what} must be different ones of {', '.join(possible)}, not {named!r:.80}")
     return [one for one in possible if one in named]
 
 

@@ -31,7 +31,7 @@ class Assembler:
         self.positions = model.loops.of_positions
         self.tolerance = one_number(tolerance, "tolerance")
         if not 0 < self.tolerance < np.inf:
-            raise _core.ModelError(f"tolerance: a positive number, not {tolerance!r}")
+            raise _core.ModelError(f"tolerance must be a positive number, not {tolerance!r}")
         if self.q.ndim != 1:
             raise _core.ModelError(f"assembly starts from one state, not from an array {self.q.shape}; give its rows one by one")
         self.kept = coordinate_numbers(model, [] if fix is None else fix) or []
@@ -200,7 +200,7 @@ def assembled(model: Any, q0: Any, v0: Any, fix: Any, starts: Any, seed: Any, to
 def _assembled_one(model: Any, q: Any, v: Any, fix: Any, starts: Any, rng: np.random.Generator, tolerance: Any) -> State:
     assembler, count = Assembler(model, q, fix, tolerance), clipped(starts, "starts")
     if count < 1:
-        raise _core.ModelError(f"starts: the number of starting states, at least 1, not {starts!r}")
+        raise _core.ModelError(f"starts must be at least 1 (the number of starting states), not {starts!r}")
     best, smallest, no_rows = assembler.q, np.inf, None
     for start in assembler.starts(count, rng):
         try:

@@ -50,7 +50,7 @@ def sko_model(
     n = len(inboard)
     bodies = [f"body{k}" for k in range(n)] if names is None else _listed("names", names, n, name)
     if not all(isinstance(body, str) for body in bodies) or len(set(bodies)) != n:
-        raise _core.ModelError(f"names of {name!r}: {n} different texts, not {bodies!r}")
+        raise _core.ModelError(f"names of {name!r} must be {n} different strings, not {bodies!r}")
     masses = [_square(f"M of body {body!r}", m) for body, m in zip(bodies, _listed("M", M, n, name), strict=True)]
     sizes = [len(m) for m in masses]
     maps = [_rows(f"H of body {body!r}", h, size) for body, h, size in zip(bodies, _listed("H", H, n, name), sizes, strict=True)]
@@ -73,7 +73,7 @@ def sko_model(
 def _listed(what: str, blocks: Any, count: int, name: str) -> list[Any]:
     """Return the blocks of one operator, one per body."""
     if isinstance(blocks, str) or not hasattr(blocks, "__len__"):
-        raise _core.ModelError(f"{what} of {name!r}: a list with one block per body, not {blocks!r}")
+        raise _core.ModelError(f"{what} of {name!r} must be a list with one block per body, not {blocks!r}")
     if len(blocks) != count:
         raise _core.ModelError(f"{what} of {name!r}: {len(blocks)} for {count} bodies; give one per body")
     return list(blocks)

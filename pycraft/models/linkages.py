@@ -49,7 +49,7 @@ def n_four_bar(windows: int = 1, angle: float = np.pi / 2) -> Multibody:
     """
     windows, angle = whole(windows, "windows"), one_number(angle, "angle")
     if windows < 1:
-        raise _core.ModelError(f"windows={windows}: a whole number, 1 or more")
+        raise _core.ModelError(f"windows={windows}: give a whole number, 1 or more")
     model = Multibody(f"{windows} four-bars")
     for i in range(windows + 1):
         model.add_body(f"crank{i}", None, position=(i, 0, 0), **rod())
@@ -110,7 +110,7 @@ def peaucellier(long: float = 1.0, short: float = 0.4, crank: float = 0.35, angl
 
     Parameters
     ----------
-    long, short, crank : m, of 1 kg per metre; the pen is in reach only if 2 crank < long - short, or less
+    long, short, crank : m, of 1 kg per metre; 2 crank cos(angle/2) must lie between long - short and long + short
     angle : rad, of the crank from x
     """
     long, short, crank, angle = _numbers(long=long, short=short, crank=crank, angle=angle)
@@ -152,7 +152,7 @@ def five_bar(base: float = 0.3, inner: float = 0.2, outer: float = 0.3, angles: 
     base, inner, outer = _numbers(base=base, inner=inner, outer=outer)
     angles = _core.real_array(angles, "angles")
     if angles.shape != (2,):
-        raise _core.ModelError(f"angles: two, of the motors, not an array {angles.shape}")
+        raise _core.ModelError(f"angles must be two values, for the motors, not an array {angles.shape}")
     model = Multibody("five-bar")
     elbows = [np.array([side * base / 2, 0]) + inner * np.array([np.cos(a), np.sin(a)]) for side, a in zip((-1, 1), angles, strict=True)]
     between = (elbows[1] - elbows[0]) / 2
@@ -185,7 +185,7 @@ def stewart(base: float = 1.0, plate: float = 0.6, height: float = 1.0) -> Multi
     base, plate, height = _numbers(base=base, plate=plate, height=height)
     for name, value in (("base", base), ("plate", plate), ("height", height)):
         if not 0 < value < np.inf:
-            raise _core.ModelError(f"{name}={value}: a positive length")
+            raise _core.ModelError(f"{name}={value}: give a positive length")
     model = Multibody("stewart")
     model.add_body("platform", hinge="free", mass=2.0, inertia=plate**2 * np.diag([0.5, 0.5, 1.0]))
     model.add_node("plate", "platform")

@@ -83,7 +83,7 @@ def checked_tolerance(tolerance: Any) -> float:
     """Return a tolerance for singular values relative to the longest row. ModelError unless it is between 0 and 1."""
     checked = one_number(tolerance, "tolerance")
     if not 0 < checked < 1:
-        raise _core.ModelError(f"tolerance: between 0 and 1, of singular values over the longest row, not {checked!r}")
+        raise _core.ModelError(f"tolerance must be between 0 and 1 (singular values relative to the longest row), not {checked!r}")
     return checked
 
 

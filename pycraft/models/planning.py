@@ -30,7 +30,7 @@ class Planning(WithOperators):
         if batch is None:
             return self.zero_q()
         if not 0 <= whole(batch, "batch") <= LARGEST:
-            raise _core.ModelError(f"batch: a number of states, from 0 to {LARGEST}, not {batch}")
+            raise _core.ModelError(f"batch must be a number of states from 0 to {LARGEST}, not {batch}")
         return np.tile(self.zero_q(), (batch, 1))
 
     def distance_to_limits(self, q=None) -> LimitDistances:

@@ -16,6 +16,8 @@ from ..closed import Closed
 from .letters_with_arguments import NAMES, LetterWithArguments, listed_names
 from .loop_letters import NAMES as _OF_LOOPS
 from .loop_letters import loop_letter
+from .rotor_letters import NAMES as _OF_ROTORS
+from .rotor_letters import rotor_letter
 
 if TYPE_CHECKING:
     from .free_operators import FreeOperators
@@ -35,9 +37,9 @@ class OperatorSet(Closed):
     Attributes are the book's letters in ASCII: ``E phi phi_tilde H M J R P P_plus D G K tau tau_bar E_psi psi psi_tilde Upsilon Omega``,
     ``I`` the identity, ``MM = H φ M φ* H*`` and its inverse ``MM_inv`` (if hinges have rotor inertias, the equations of motion have ``MM +
     J``), the velocity-dependent ``Delta_theta_dot V_tilde V_bar momentum_cross H_dot``, the vectors ``theta_dot velocity a b gravity_field
-    gravity_base``, and ``X_world``; for loops ``Q`` and ``A``. With arguments: ``B(names)``, ``Jacobian(names)``, ``Lambda(names)`` of
-    nodes, ``Delta(coordinate)``. Spaces: ``Theta``, ``V``, ``F``, ``NodesV(names)``, ``NodesF(names)``. Calling the set with a string of
-    names returns a tuple.
+    gravity_base``, and ``X_world``; for rotors ``b_J``, ``C_J`` and ``hinge_cross``; for loops ``Q`` and ``A``. With arguments:
+    ``B(names)``, ``Jacobian(names)``, ``Lambda(names)`` of nodes, ``Delta(coordinate)``. Spaces: ``Theta``, ``V``, ``F``,
+    ``NodesV(names)``, ``NodesF(names)``. Calling the set with a string of names returns a tuple.
 
     Examples
     --------
@@ -74,6 +76,8 @@ class OperatorSet(Closed):
             if name not in self._made:
                 self._made[name] = _COMPOSED[name](self)
             return self._made[name]
+        if name in _OF_ROTORS:
+            return rotor_letter(self, name)
         if name in _OF_LOOPS:
             return loop_letter(self._source, self._model, name, self._made)
         if name in _SPACES:
@@ -92,10 +96,10 @@ class OperatorSet(Closed):
         )
 
     def __dir__(self) -> Iterable[str]:
-        return [*super().__dir__(), *NAMES, "I", *_COMPOSED, *_OF_LOOPS, *_SPACES]
+        return [*super().__dir__(), *NAMES, "I", *_COMPOSED, *_OF_ROTORS, *_OF_LOOPS, *_SPACES]
 
     def _ipython_key_completions_(self) -> list[str]:
-        return [*NAMES, "I", *_COMPOSED, *_OF_LOOPS]
+        return [*NAMES, "I", *_COMPOSED, *_OF_ROTORS, *_OF_LOOPS]
 
     def NodesV(self, names: str | Sequence[str]) -> _core.Space:
         """Return the space of stacked motions of these nodes, six components each."""

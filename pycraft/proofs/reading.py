@@ -16,6 +16,7 @@ from ..identities.parse import ParseError, Statement, Statements
 from .derivative import TIME, derivative
 from .lifting import lifted
 from .proof import HYPOTHESES
+from .rotors import GYRATING, rotors_of_any
 
 
 @dataclass
@@ -69,7 +70,8 @@ class Reading:
                 self.unknown.add(d.name)
 
     def _statements(self, more: Mapping[str, Any] | None = None) -> Statements:
-        return Statements(self.operators, {**(more or {}), **self.extra}, derive=along if self.written_out else _formula)
+        known = {**rotors_of_any(self.operators), **(more or {}), **self.extra}
+        return Statements(self.operators, known, derive=along if self.written_out else _formula)
 
     def statement(self, text: str) -> Statement:
         """Return the statement, with the definitions before and after it. Raises ParseError."""
@@ -122,7 +124,9 @@ class Reading:
 
 def _formula(x: Any, direction: str, operators: Any) -> Any:
     """Return ∂x for a proof on every model: a letter for the product rule and ∂E_φ = E_φΔ_i; a scalar's derivative is computed."""
-    if isinstance(x, _core.Scalar):
+    if direction == "t" and GYRATING in x.text():
+        raise ParseError("the rate of what rotors add, b_J and C_J, is not taken in proofs: pycraft.check evaluates it")
+    if isinstance(x, _core.Scalar) or direction not in (*COORDINATES, "t"):
         return along(x, direction, operators)
     return derivative(x, TIME if direction == "t" else coordinates_meant(operators)[COORDINATES.index(direction)])
 

@@ -1,4 +1,4 @@
-"""Scenes: a model and the effects that act on it, each added by name; what is not named costs nothing."""
+"""Scenes: a model and the effects that act on it, each added by name. Effects that are not added cost nothing."""
 
 from . import effects, mechanisms
 from .checkpoint import Checkpoint

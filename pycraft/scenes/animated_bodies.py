@@ -1,4 +1,4 @@
-"""A run as what other engines play: triangles fixed on bodies, and the bodies' poses at the times of frames."""
+"""A run for playback in other engines: triangles fixed on bodies, and the bodies' poses at the times of frames."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .run_animation import configurations, positive
 from .run_page import frame_times
 
 STICK, JOINT = 0.012, 0.022
-"""Of the model's reach: the radii of sticks and of the balls at hinges, of bodies without shapes."""
+"""Radii of the sticks and balls that show bodies without shapes, as fractions of the model's reach."""
 GREY, BLUE = "#b9c2cc", "#1f4e79"
 
 
 def linear_colour(colour: str) -> list[float]:
-    """Red, green and blue from 0 to 1, in proportion to light, of "#rrggbb", which is sRGB. [IEC 61966-2-1]"""
+    """Return linear red, green and blue from 0 to 1 of "#rrggbb", which is sRGB. [IEC 61966-2-1]"""
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
     return [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts]
 
@@ -39,21 +39,21 @@ class Solid:
 
 
 class AnimatedBodies:
-    """What is seen of a run over time.
+    """The visible bodies of a run over time.
 
     Parameters
     ----------
     run : Run
-    fps : frames a second of the film
-    speed : seconds of the run in a second of the film
+    fps : frames per second of the film
+    speed : seconds of the run per second of the film
 
     Attributes
     ----------
-    names : of the bodies
-    times : (K,) s of the film, from 0
-    rotations, positions : (K, n, 3, 3), (K, n, 3) of the bodies in the world, m
-    solids : list of Solid: shapes of the model's file, sticks of bodies that have none
-    missing : list of str, why shapes are not there
+    names : names of the bodies
+    times : (K,) s, times in the film, from 0
+    rotations, positions : (K, n, 3, 3), (K, n, 3), poses of the bodies in the world, m
+    solids : list of Solid: shapes of the model's file, sticks for bodies without shapes
+    missing : list of str, why shapes are missing
     up : 0, 1 or 2, the upright axis of the world
     """
 
@@ -73,7 +73,7 @@ class AnimatedBodies:
         self.up = upright(self.model)[1]
 
     def quaternions(self) -> np.ndarray:
-        """(K, n, 4) x, y, z, w of the rotations, each with the sign nearer to the frame before: players interpolate."""
+        """Return quaternions x, y, z, w (K, n, 4), each with the sign nearer to the frame before, because players interpolate."""
         from scipy.spatial.transform import Rotation
 
         frames, count = self.rotations.shape[:2]
@@ -83,7 +83,7 @@ class AnimatedBodies:
 
 
 def _sticks(skeleton: Skeleton) -> list[Solid]:
-    """Capsules along the bones of the stick figure, and balls at its hinges."""
+    """Return capsules along the bones of the stick figure, and balls at its hinges."""
     poses = skeleton.poses(skeleton.model.zero_q())
     owners, places = skeleton.lines["bone"]
     joints, at = skeleton.points["joint"]
@@ -101,7 +101,7 @@ def _sticks(skeleton: Skeleton) -> list[Solid]:
 
 
 def _capsule(a: np.ndarray, b: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """From a to b."""
+    """Return a capsule from a to b."""
     length = float(np.linalg.norm(b - a))
     vertices, faces = triangles(Shape("", "capsule", (radius, length), np.eye(4)))
     z = (b - a) / length

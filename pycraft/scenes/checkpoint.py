@@ -1,4 +1,4 @@
-"""Checkpoints: where a run can go on from."""
+"""Checkpoints, from which a run can be resumed."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ FORMAT = "pycraft checkpoint 2"
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """All that a run goes on from: `scene.resume(checkpoint, T)`.
+    """State from which a run can be resumed: `scene.resume(checkpoint, T)`.
 
-    Numbers are exact sums of doubles, so that nothing is lost in any precision. It pickles, and `save` writes it as text.
+    Values are exact sums of doubles, so that nothing is lost in any precision. It can be pickled, and `save` writes it as text.
 
     Attributes
     ----------
-    t : s, where the resumed run begins: the start of the last step if that was cut short by the end of the run
-    model, effects : what the scene was: its model's name, the names of the effects that were on
-    coordinates : what the numbers of the state are of: "elbow of forearm", a coordinate of the hinge of that body
-    integrator, options : what the run was told
-    state : for the core
+    t : s, start of the resumed run: the start of the last step if the end of the run cut that step short
+    model, effects : name of the scene's model, names of the effects that were on
+    coordinates : coordinates of the state: "elbow of forearm", a coordinate of the hinge of that body
+    integrator, options : arguments of the run
+    state : state of the core
     """
 
     t: float
@@ -38,12 +38,12 @@ class Checkpoint:
     state: dict[str, Any]
 
     def save(self, path: str | Path) -> None:
-        """Write it as JSON. OSError where the path cannot be written."""
+        """Write the checkpoint as JSON. Raises OSError if the path cannot be written."""
         Path(path).write_text(json.dumps({"format": FORMAT, **asdict(self)}, indent=1) + "\n", encoding="utf-8")
 
     @classmethod
     def load(cls, path: str | Path) -> Checkpoint:
-        """Read what `save` wrote. EvaluationError for a file that is none, or whose numbers make no sense."""
+        """Read a checkpoint written by `save`. Raises EvaluationError for other files and invalid values."""
         try:
             data = json.loads(Path(path).read_text(encoding="utf-8"))
             _check(isinstance(data, dict) and data.pop("format", None) == FORMAT, f"its format is not {FORMAT!r}")
@@ -57,7 +57,7 @@ class Checkpoint:
 
 
 def coordinates_of(model: Any) -> tuple[str, ...]:
-    """What each number of v is of. An edit that hangs bodies elsewhere, or moves the root, may leave as many of them."""
+    """Return the body and coordinate of each entry of v. Edits that move bodies or the root may keep their number but not their meaning."""
     bodies, hinges = model._names()[:2]
     moved = dict(zip(hinges, bodies, strict=True))
     return tuple(f"{name} of {moved[name if name in moved else name[: name.rindex('[')]]}" for name in model.coordinate_names)
@@ -80,7 +80,7 @@ def _number(x: Any) -> bool:
 
 
 def _sums(given: Any) -> bool:
-    """Whether it is a list of exact sums."""
+    """Return True for a list of exact sums."""
     return isinstance(given, list) and all(isinstance(parts, list) and parts and all(map(_number, parts)) for parts in given)
 
 
@@ -102,7 +102,7 @@ def _check_entries(data: dict[str, Any]) -> None:
         _check(_sums([state[name]]), f"{name} of the state is a list of finite numbers that are added up, not {state[name]!r:.40}")
     for name in ("x", "lengths"):
         _check(_sums(state[name]), f"{name} of the state is a list of lists of finite numbers that are added up")
-    _check(_number(data["t"]) and data["t"] == sum(state["t"]), f"t is {data['t']!r:.40}, and that of the state {sum(state['t']):g}")
+    _check(_number(data["t"]) and data["t"] == sum(state["t"]), f"t is {data['t']!r:.40}, but the state has {sum(state['t']):g}")
     _check(sum(state["size"]) > 0, f"size of the state is {sum(state['size']):g}; a step is a positive number of seconds")
     taken = state["taken"]
     _check(type(taken) is int and 0 <= taken < 2**62, f"taken of the state is a count of steps, not {taken!r:.40}")

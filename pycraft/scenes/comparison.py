@@ -1,4 +1,4 @@
-"""What each effect buys: the error that leaving it out makes, against the time that it saves."""
+"""Value of each effect: the error of leaving it out, against the time saved."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ..tidy import TidyTable, error_text, refusal_text, seconds_text, share_text
 from .measuring import effects_on, evaluation_of, having_on, in_turn, mark_front, run_at, sampled_times, timed_run
 
 LOOSER = 100.0
-"""The error of the whole scene's own run is its distance to one at tolerances so many times its own, as in `pycraft.work_precision`; of
-steps of one size twice its distance to one of half the step."""
+"""Factor of tolerances: the error of the whole scene's own run is its distance to a run at looser tolerances, as in
+`pycraft.work_precision`; for fixed steps, twice its distance to a run with half the step."""
 
 
 class ComparisonTable(TidyTable):
     """Rows of `Scene.compare`: the scene with everything, then without each effect or set of effects.
 
-    Each row is a dictionary: "left out" (a list of names), "together" (whether they are those that matter least), "acceleration" (error of
+    Each row is a dictionary: "left out" (a list of names), "together" (True for the sets that matter least), "acceleration" (error of
     the accelerations, ‖δv̇‖ relative to the largest ‖v̇‖ along the run of the whole scene, the largest over its sampled states),
     "trajectory" (rad, m: the root mean square over coordinates, the largest over the times), "evaluation" and "run" (s), "saved" and
-    "saved of run" (shares of the whole scene's times), "evaluations" (of the run), "resolved" (whether "trajectory" stands above
-    `own_error`), "pareto" (no other row has a faster run and a smaller error), "refused" (the reason, where there is one).
+    "saved of run" (shares of the whole scene's times), "evaluations" (of the run), "resolved" (True if "trajectory" exceeds
+    `own_error`), "pareto" (no other row has a faster run and a smaller error), "refused" (the reason, if the scene was refused).
 
-    own_error : rad, m, of the whole scene's run itself. noise : share of an evaluation, by which two measurements of one thing differed.
+    own_error : rad, m, error of the whole scene's run. noise : share of an evaluation by which two measurements of the same scene differed.
     """
 
     columns = (
@@ -59,21 +59,21 @@ class ComparisonTable(TidyTable):
         return sorted((row for row in self.rows if row["pareto"]), key=lambda row: row["run"])
 
     def plot(self, axes: Any = None) -> Any:
-        """Two panels, errors of trajectory and accelerations against the times of a run and of an evaluation; returns the axes."""
+        """Plot two panels, errors of trajectory and accelerations against the times of a run and of an evaluation; return the axes."""
         from .cost_pictures import comparison_plot
 
         return comparison_plot(self, axes)
 
     def stack(self, axes: Any = None) -> Any:
-        """The effects as a stack: what each costs of an evaluation, and in the same colours what the run is off by without it.
+        """Plot the effects as a stack: the cost of each in an evaluation, and in the same colours the error of the run without it.
 
         Parameters
         ----------
-        axes : two Axes of Matplotlib, side by side; new ones where left out
+        axes : two Axes of Matplotlib, side by side; default: new ones
 
         Returns
         -------
-        The axes. What passes share, none of their effects costs alone: it is in "all the rest".
+        The axes. Costs of a pass that several effects share belong to none of them: they are in "all the rest".
         """
         from .effect_stack import effect_stack
 
@@ -100,7 +100,7 @@ class ComparisonTable(TidyTable):
             return seconds_text(row[key])
         if key == "saved" and abs(row[key]) < self.noise:
             return "none" if row["left out"] else ""
-        if row["left out"] and row[key] < -1:  # a run that takes several times as long saves no percentage
+        if row["left out"] and row[key] < -1:  # a percentage is unclear for a run several times as long
             return f"takes {1 - row[key]:.2g} ×"
         return share_text(row[key]) if row["left out"] else ""
 
@@ -112,7 +112,7 @@ class ComparisonTable(TidyTable):
 
 
 class Leaving:
-    """A scene's run, and the errors that leaving effects out of it makes."""
+    """A scene's run, and the errors of leaving effects out."""
 
     def __init__(self, scene: Any, T: Any, q: Any, v: Any, options: dict[str, Any]):
         checked_model(scene.model, "a comparison of a scene")
@@ -128,7 +128,7 @@ class Leaving:
         self.largest = float(np.linalg.norm(self.run.vdot, axis=1).max()) or 1.0
 
     def without(self, names: Iterable[str]) -> Any:
-        """The scene without these effects."""
+        """Return the scene without these effects."""
         return having_on(self.scene, set(self.on) - set(names))
 
     def run_without(self, names: Iterable[str], **other: Any) -> Any:
@@ -136,7 +136,7 @@ class Leaving:
         return run_at(self.without(names), self.times, self.q, self.v, **self.options | other)
 
     def acceleration_error(self, names: Iterable[str]) -> float:
-        """Of the accelerations, at the states of the whole scene's run."""
+        """Return the error of the accelerations at the states of the whole scene's run."""
         left = set(names)
         kept = [self.run.states[:, self.own[name]] for name in self.on if name not in left]
         own = np.concatenate([np.zeros((len(self.times), 0)), *kept], axis=1)
@@ -144,23 +144,23 @@ class Leaving:
         return float(np.linalg.norm(vdot - self.run.vdot, axis=1).max()) / self.largest
 
     def trajectory_error(self, run: Any) -> float:
-        """rad, m: of a run, against the whole scene's."""
+        """Return the error of a run relative to the whole scene's run, rad, m."""
         return trajectory_error(self.scene.model, self.run.q, run.q)
 
     def own_error(self) -> float:
-        """rad, m: of the whole scene's run itself, or more."""
+        """Return an estimate of the error of the whole scene's run, not too small, rad, m."""
         if takes_one_size(integrator_named(self.options["integrator"]).name):
             finer = self.run_without((), step=self.options["step"] / 2)
-            return 2 * self.trajectory_error(finer)  # of order one and higher, half the error at least is between them
+            return 2 * self.trajectory_error(finer)  # for order one and higher, they differ by at least half the error
         looser = {name: LOOSER * self.options[name] for name in ("rtol", "atol")}
         tighter = {name: self.options[name] / LOOSER for name in ("rtol", "atol")}
         found = []
         for tolerances in (looser, tighter):
             try:
                 found.append(self.trajectory_error(self.run_without((), **tolerances)))
-            except (ArithmeticError, _core.Error):  # too loose for it, or too tight
+            except (ArithmeticError, _core.Error):  # the tolerance is too loose or too tight
                 continue
-            if found[-1] > 0:  # else the steps were the same: the largest there are
+            if found[-1] > 0:  # otherwise both runs took the same, largest steps
                 break
         return max(found, default=float(np.inf))
 
@@ -205,24 +205,24 @@ def _listed(without: Any) -> list[Any]:
     if isinstance(without, str) or not isinstance(without, Iterable):
         return [without]
     if not (found := list(without)):
-        raise _core.EvaluationError("without is empty: nothing to compare; leave it out for every effect that is on")
+        raise _core.EvaluationError("without is empty: name effects, or leave it out to compare every effect that is on")
     return found
 
 
 def _checked_set(scene: Any, given: Any) -> list[str]:
-    """The names of one effect or a set of them, all of which are on."""
+    """Return the names of one effect or a set of effects, and check that they are on."""
     several = isinstance(given, (list, tuple, set, frozenset))
     names = list(dict.fromkeys(scene._name(one) for one in (given if several else [given])))
     for name in names:
         if not scene.is_on(name):
             raise _core.ModelError(f"effect {name!r} is off already; enable it to see what leaving it out does")
     if not names:
-        raise _core.EvaluationError("without: a set of no effects; the scene with everything is a row of its own")
+        raise _core.EvaluationError("without contains an empty set of effects; the whole scene always has its own row")
     return names
 
 
 def _errors(whole: Leaving, names: list[str], own: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """A row without its times."""
+    """Return a row without its times."""
     row: dict[str, Any] = dict.fromkeys(ComparisonTable.columns) | {"left out": names, "together": False, "pareto": False, "refused": ""}
     if not names:
         return row | {"acceleration": 0.0, "trajectory": 0.0, "resolved": False, "evaluations": whole.run.statistics["evaluations"]}
@@ -237,7 +237,7 @@ def _errors(whole: Leaving, names: list[str], own: float, tell: Callable[[str], 
 
 
 def _together(whole: Leaving, rows: list[dict[str, Any]], own: float, tell: Callable[[str], None]) -> list[dict[str, Any]]:
-    """What matters least left out together: two effects, three, and so on, but for all."""
+    """Yield the sets of effects that matter least: two effects, three, and so on, except all."""
     ranked = sorted((row for row in rows[1:] if not row["refused"]), key=lambda row: (row["trajectory"], row["acceleration"]))
     names = [row["left out"][0] for row in ranked]
     return [_errors(whole, names[:count], own, tell) | {"together": True} for count in range(2, len(whole.on))]

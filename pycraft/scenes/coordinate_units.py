@@ -1,4 +1,4 @@
-"""Names and units of what is in q and v."""
+"""Names and units of the entries of q and v."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from .. import _core
 from ..state import names_of_q
 
 POWER = {"rad": "N m", "m": "N"}
-"""Units of a generalized force, by the coordinate's."""
+"""Unit of a generalized force, by the unit of its coordinate."""
 
 
 def coordinate_units(model: Any) -> tuple[list[str], list[str], list[str]]:
-    """Names of the numbers of q, their units ("" of quaternions), and the units of the coordinates of v ("rad" or "m", a second less)."""
+    """Return names of the entries of q, their units ("" for quaternions), and units of the coordinates of v ("rad" or "m", without 1/s)."""
     of_q: list[str] = []
     of_v: list[str] = []
     for hinge in model.hinges.values():

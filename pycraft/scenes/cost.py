@@ -1,4 +1,4 @@
-"""What a scene costs: every pass, every effect that is on, what those that are off would cost, and their share of a step."""
+"""Cost of a scene: every pass, every effect that is on, the cost that effects that are off would have, and shares of a step."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _KINDS = {
     "works": "off",
 }
 LONGEST, SHORTEST = 1.0, 1e-6
-"""Seconds of motion of the runs that an integrator's share is measured with."""
+"""Durations of motion, s, of the runs that measure an integrator's share."""
 
 
 class CostTable(TidyTable):
-    """Rows of `Scene.cost`: times of one evaluation of the accelerations and what a step spends beside it, each measured.
+    """Rows of `Scene.cost`: measured times of one evaluation of the accelerations, and of the rest of a step.
 
     Each row is a dictionary: "what" (its name), "kind" ("pass", "between" them, "integrator", "step" for their sum; "on", "off" of effects;
-    "works"), "seconds" (of a pass its own; of an effect that is on, what the scene is faster without it, of one that is off, what it would
-    be slower with it: below `noise` either is nothing), "share" (of a step), "because" (the effects that a pass is there for, and other
-    notes), "refused" (why an effect that is off cannot be on, else empty).
+    "works"), "seconds" (for a pass its own time; for an effect that is on, the time saved without it; for an effect that is off, the time
+    added with it: below `noise` both are insignificant), "share" (of a step), "because" (the effects that need a pass, and other
+    notes), "refused" (why an effect that is off cannot be turned on, else empty).
 
-    `noise` : s, by which two measurements of the scene itself differed.
+    `noise` : s, difference of two measurements of the scene itself.
     """
 
     columns = ("what", "kind", "seconds", "share", "because", "refused")
@@ -47,14 +47,14 @@ class CostTable(TidyTable):
         return self.about["noise"]
 
     def marks(self, row: dict[str, Any]) -> str:
-        return self.cell("because", row)  # a column of words however narrow the terminal
+        return self.cell("because", row)  # this column is shown on any width of terminal
 
     def of(self, *kinds: str) -> list[dict[str, Any]]:
-        """The rows of these kinds."""
+        """Return the rows of these kinds."""
         return [row for row in self.rows if row["kind"] in kinds]
 
     def __getitem__(self, index: Any) -> dict[str, Any]:
-        """A row by its number, or that of an effect by its name."""
+        """Return a row by its number, or the row of an effect by its name."""
         if isinstance(index, str):
             for row in self.of("on", "off"):
                 if row["what"] == index:
@@ -80,7 +80,7 @@ class CostTable(TidyTable):
         return "bold" if row["kind"] == "step" else "dim" if row["kind"] in ("off", "works") else ""
 
     def plot(self, axes: Any = None) -> Any:
-        """Two panels: a step as its parts, and what each effect costs or would cost; returns the axes."""
+        """Plot two panels: the parts of a step, and the actual or potential cost of each effect; return the axes."""
         from .cost_pictures import cost_plot
 
         return cost_plot(self, axes)
@@ -102,7 +102,7 @@ def cost(
     tell("effects")
     variants, refused = _variants(scene)
     timed = [evaluation_of(scene, q, v), *(evaluation_of(other, q, v) for other in variants.values())]
-    # The scene's own once more, for the noise; and with the powers of its effects.
+    # The scene itself once more, for the noise; and with the powers of its effects.
     whole, *others, again, works = in_turn(seconds, [*timed, timed[0], evaluation_of(scene, q, v, works=True)])
     whole, noise = min(whole, again), abs(whole - again)
     tell(integrator)
@@ -131,7 +131,7 @@ def cost(
 
 
 def _variants(scene: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    """By effect the scene where it is off and was on, or on and was off; and why not, where it cannot be."""
+    """Return for each effect the scene with this effect switched, and the reason if it cannot be."""
     on = effects_on(scene)
     variants, refused = {}, {}
     for name in scene.effects:
@@ -145,13 +145,13 @@ def _variants(scene: Any) -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def _a_step(scene: Any, q: np.ndarray, v: np.ndarray, seconds: float, **options: Any) -> tuple[float, str]:
-    """Seconds of a run for each of its evaluations, and what its steps are, in words."""
+    """Return the seconds of a run per evaluation, and its steps in words."""
     T, spent, best, words = SHORTEST, 0.0, np.inf, ""
     while True:
         run, took = timed_run(scene, [T], q, v, **options)
         about = run.statistics
         best, spent = min(best, took / max(about["evaluations"], 1)), spent + about["seconds"]
-        words = f"{about['evaluations'] / max(about['steps'], 1):.3g} evaluations a step"
+        words = f"{about['evaluations'] / max(about['steps'], 1):.3g} evaluations per step"
         if spent >= seconds and (T >= LONGEST or spent >= 2 * seconds) or spent >= 20 * seconds + 0.1:
             return float(best), words
         T = min(4 * T, LONGEST)

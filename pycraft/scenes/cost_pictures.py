@@ -1,4 +1,4 @@
-"""Pictures of what scenes cost, what leaving effects out saves, and what accuracy costs."""
+"""Pictures of the cost of scenes, of the time saved without effects, and of the cost of accuracy."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from ..accuracy.tables.plotting import (
 from ..tidy import seconds_text
 
 PASS, BESIDE, OFF = "#1f4e79", "#8a8a8a", "#c55a11"
-"""Of passes and effects that are on; of what a step spends beside them; of what is off."""
+"""Colours of passes and effects that are on, of the rest of a step, and of effects that are off."""
 WIDE_SPREAD = 5.0
-"""Times that are so many times each other are drawn on a logarithmic axis."""
+"""Ratio of times beyond which the axis is logarithmic."""
 BAR = 0.3
-"""Inches of a bar with its gap."""
+"""Height of a bar with its gap, inches."""
 
 
 def cost_plot(table: Any, axes: Any = None) -> Any:
-    """Two panels of bars: the parts of a step, and what each effect costs, or would cost where it is off."""
+    """Plot two panels of bars: the parts of a step, and the cost of each effect, or the cost it would have if on."""
     parts, effects = table.of("pass", "between", "integrator"), table.of("on", "off", "works")
     if axes is None:
         import matplotlib.pyplot as plt
@@ -49,14 +49,14 @@ def cost_plot(table: Any, axes: Any = None) -> Any:
         colours,
     )
     total = table.of("step")[0]["seconds"]
-    axes[0].set_title(f"{table.title}\n{seconds_text(total)} of a step for each evaluation, by its parts", fontsize="medium", loc="left")
+    axes[0].set_title(f"{table.title}\n{seconds_text(total)} of a step per evaluation, by its parts", fontsize="medium", loc="left")
     measured = [row for row in effects if row["seconds"] is not None]
     if measured:
         texts = [", ".join(filter(None, (table.cell("seconds", row), table.cell("share", row)))) for row in measured]
         names = [row["what"] + (f"  ({row['because']})" if row["because"] else "") for row in measured]
         colours = [PASS if row["kind"] == "on" else OFF for row in measured]
         _bars(axes[1], names, [max(row["seconds"], 0.0) for row in measured], texts, colours, [row["kind"] != "on" for row in measured])
-        axes[1].set_title("what each effect costs; hollow: what it would cost", fontsize="medium", loc="left")
+        axes[1].set_title("cost of each effect; hollow: effects that are off", fontsize="medium", loc="left")
     else:
         axes[1].set_axis_off()
         axes[1].text(0.0, 0.5, "the scene has no effects", transform=axes[1].transAxes, color="0.4")
@@ -64,7 +64,7 @@ def cost_plot(table: Any, axes: Any = None) -> Any:
 
 
 def _bars(ax: Any, names: Sequence[str], values: Sequence[float], texts: Sequence[str], colours: Sequence[str], hollow: Any = None) -> None:
-    """Bars with their numbers beside them, the first on top."""
+    """Draw bars with their values beside them, the first on top."""
     from matplotlib.ticker import MaxNLocator
 
     hollow = hollow or [False] * len(names)
@@ -84,7 +84,7 @@ def _bars(ax: Any, names: Sequence[str], values: Sequence[float], texts: Sequenc
 
 
 def comparison_plot(table: Any, axes: Any = None) -> Any:
-    """Two panels: error of the trajectory against the time of a run with the Pareto front, error of v̇ against that of an evaluation."""
+    """Plot two panels: error of the trajectory against run time with the Pareto front, error of v̇ against evaluation time."""
     from matplotlib.ticker import MaxNLocator
 
     if axes is None:
@@ -125,13 +125,13 @@ def comparison_plot(table: Any, axes: Any = None) -> Any:
 
 
 def _left_out(row: dict[str, Any]) -> str:
-    """What is left out, as short as it can be."""
+    """Return the effects left out, in the shortest form."""
     names = row["left out"]
     return "everything on" if not names else f"the {len(names)} least" if row["together"] else " + ".join(names)
 
 
 def _room(ax: Any, times: np.ndarray, heights: np.ndarray) -> None:
-    """Limits of the axes that leave room for labels."""
+    """Set limits of the axes that leave space for labels."""
     spread = float(np.ptp(times)) or 0.2 * float(times.max())
     if times.max() >= WIDE_SPREAD * times.min():
         ax.set(xscale="log", xlim=(times.min() / 1.6, times.max() * 2.0))
@@ -142,7 +142,7 @@ def _room(ax: Any, times: np.ndarray, heights: np.ndarray) -> None:
 
 
 def scene_accuracy_plot(table: Any, ax: Any = None) -> Any:
-    """Error of the trajectory against the time of a run: lines of integrators, forms and precisions, the scene without each effect."""
+    """Plot the error of the trajectory against run time: lines of integrators, forms and precisions, and the scene without each effect."""
     from matplotlib.lines import Line2D
 
     ax = axes_of(ax, (8.2, 4.8))
@@ -186,7 +186,7 @@ def scene_accuracy_plot(table: Any, ax: Any = None) -> Any:
 
 
 def _legend_of_points(rows: list[dict[str, Any]], line: Any) -> list[Any]:
-    """Of forms, precisions, scenes that lack an effect, and the front."""
+    """Return the legend of forms, precisions, scenes without an effect, and the front."""
     arithmetic = [row for row in rows if row["varied"] == "arithmetic"]
     handles = []
     for form in dict.fromkeys(row["form"] for row in arithmetic):
@@ -201,11 +201,11 @@ def _legend_of_points(rows: list[dict[str, Any]], line: Any) -> list[Any]:
 
 
 METHOD_STYLES = {"augment": ("#1f4e79", "o"), "embed": ("#c55a11", "s"), "penalty": ("#4d7c2a", "^")}
-"""Colour and marker of what keeps loops, told apart by either."""
+"""Colour and marker of the methods that keep loops; either one identifies the method."""
 
 
 def loops_plot(table: Any, axes: Any = None) -> Any:
-    """Three panels against the time of a run: error of the trajectory, drift of the rows, energy error; a line a method and integrator."""
+    """Plot three panels against run time: error of the trajectory, drift of the rows, energy error; a line per method and integrator."""
     if axes is None:
         import matplotlib.pyplot as plt
 

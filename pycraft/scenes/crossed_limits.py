@@ -13,10 +13,10 @@ from ..models.warning import warn
 from .effects import Limits
 
 SLACK = 1e-9
-"""How far beyond a limit still counts as at it: rad or m, times the larger of 1 and the limit."""
+"""Tolerance beyond a limit, rad or m, times the larger of 1 and the limit."""
 
 SHOWN = 4
-"""Coordinates that a warning or a line of text names."""
+"""Largest number of coordinates named in a warning or a line of text."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class CrossedLimit:
     ----------
     coordinate : its name
     limit : rad or m, the limit that was crossed
-    upper : whether that is the upper one
+    upper : True for an upper limit
     first : s, the first time among the run's states beyond it
     farthest : rad or m, the value farthest beyond it
     """
@@ -43,7 +43,7 @@ class CrossedLimit:
 
 
 def unheld_limits(model: Any, stops: Iterable[Limits]) -> CoordinateLimits | None:
-    """Return the limits of a model that none of these effects holds, or None where there are none. Cost: O(N)."""
+    """Return the limits of a model that none of these effects holds, or None if there are none. Cost: O(N)."""
     limits = coordinate_limits(model)
     for effect in stops:
         held = effect.made_for(model).coordinates
@@ -84,6 +84,6 @@ def warn_of_crossed_limits(model: str, crossed: list[CrossedLimit]) -> None:
     """Warn of coordinates that left limits which no effect holds."""
     if crossed:
         warn(
-            f"coordinates of {model!r} left their limits, which no effect of this scene holds: {crossed_text(crossed)}. Add "
-            "pc.effects.Limits() to hold them; run.crossed_limits has them all"
+            f"coordinates of {model!r} left their limits, and no effect of this scene holds them: {crossed_text(crossed)}. Add "
+            "pc.effects.Limits() to hold them; run.crossed_limits lists all"
         )

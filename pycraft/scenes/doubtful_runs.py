@@ -1,4 +1,4 @@
-"""What is said of doubtful runs: steps that stability holds, an energy balance that is lost, a motion below the tolerances."""
+"""Warnings on doubtful runs: steps limited by stability, a lost energy balance, a motion smaller than the tolerances."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..models.warning import warn
 from .motion import Motion
 
 ROWS = 64
-"""Rows at which a run is looked at, evenly spaced: cheap beside any run."""
+"""Number of rows at which a run is examined, evenly spaced: cheap compared with any run."""
 LOST = 0.5
-"""The share of a motion's energy that its balance changes by where the steps are too long. Order 1 at ten steps a period leaves a tenth."""
+"""Change of the balance, as a share of the motion's energy, that means too long steps. Order 1 at ten steps per period gives a tenth."""
 LEAST = 1e-3
-"""Of atol: below that a motion is the rounding of a state of rest."""
+"""Fraction of atol below which a motion is the rounding of a state of rest."""
 
 
 def warn_of_doubts(scene: Any, run: Any) -> None:
-    """Warn, once for each scene and cause: by at most 64 states of the run."""
+    """Warn once for each scene and cause, based on at most 64 states of the run."""
     said: set[str] = scene._doubts_said
     rows = run._steps or {"t": run.t, "q": run.q, "v": run.v, "states": run.states, "work": run._work}
     if len(rows["t"]) < 2 or not run.model.nv:
@@ -38,7 +38,7 @@ def _looked_at(rows: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def _energy_lost(run: Any, rows: Mapping[str, np.ndarray]) -> str:
-    """Of steps of one size, which no error estimate shortens, where works are kept account of; said already of those found unstable."""
+    """Return the warning on the energy balance, for fixed steps in runs that record works; steps found unstable have their own warning."""
     if not run._about["energy"] or "stiffness" in run.statistics:
         return ""
     looked = _looked_at(rows)
@@ -46,7 +46,7 @@ def _energy_lost(run: Any, rows: Mapping[str, np.ndarray]) -> str:
     with np.errstate(over="ignore", invalid="ignore"):
         try:
             energy, balance = some.energy, some.balance
-        except (ArithmeticError, _core.Error):  # an effect or a factor that is not there at a state between
+        except (ArithmeticError, _core.Error):  # an effect or a factor undefined at a state in between
             return ""
         off = np.abs(balance - balance[0]).max()
         size = energy["kinetic"].max() + np.ptp(energy["potential"]) + np.abs(energy["work"]).sum(axis=-1).max()
@@ -54,7 +54,7 @@ def _energy_lost(run: Any, rows: Mapping[str, np.ndarray]) -> str:
         return ""
     step, integrator = run._about["options"]["step"], run._about["integrator"]
     return (
-        f"the energy balance of this run changes by {off:.2g} J, of a motion that has {size:.2g} J: steps of {step:g} s are too "
+        f"the energy balance of this run changes by {off:.2g} J, while the motion has {size:.2g} J: steps of {step:g} s are too "
         f"long for {integrator!r}, which is unstable under explicit forces (Limits, Spring, NodeSpring, Damping) where "
         "h²k/m > 4 or h c/m > 2. Take a shorter step, integrator='rosenbrock4', or ImplicitSpring and ImplicitDamping with "
         "'semi-implicit-euler'"
@@ -62,7 +62,7 @@ def _energy_lost(run: Any, rows: Mapping[str, np.ndarray]) -> str:
 
 
 def _below_atol(run: Any, rows: Mapping[str, np.ndarray]) -> str:
-    """Of controlled steps: a motion smaller than the error that each of them may have."""
+    """Return the warning on a motion smaller than the allowed error of each controlled step."""
     atol = run._about["options"]["atol"]
     step = (rows["t"][-1] - rows["t"][0]) / max(run.statistics["steps"], 1)
     by = float(np.abs(rows["v"]).max()) * step
@@ -74,13 +74,13 @@ def _below_atol(run: Any, rows: Mapping[str, np.ndarray]) -> str:
     if not LEAST * atol < moved < atol:
         return ""
     return (
-        f"this motion is smaller than its tolerance: no coordinate is farther than {displaced:.2g} rad or m from zero or moves by more "
+        f"this motion is smaller than its tolerance: no coordinate is farther than {displaced:.2g} rad or m from zero, or moves by more "
         f"than {by:.2g} in a step, and atol = {atol:g} allows that as the error of each step. Take atol = {1e-3 * moved:.0e} or less"
     )
 
 
 def warn_of_stiffness(scene: Any, integrator: str, found: Mapping[str, Any]) -> None:
-    """Warn, once for each scene, that the motion is stiff or its steps are unstable, of what, and which integrator or step to take."""
+    """Warn once for each scene of stiff motion or unstable steps, with the cause and a suitable integrator or step."""
     if scene._stiffness_said:
         return
     scene._stiffness_said = True

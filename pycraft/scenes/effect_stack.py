@@ -1,4 +1,4 @@
-"""A scene's effects as a stack: what each costs of an evaluation, and beside it, in the same colours, what each changes."""
+"""A scene's effects as a stack: the share of each in an evaluation, and beside it, in the same colours, the change by each."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from ..accuracy.tables.plotting import above_zero, no_picture
 from ..tidy import seconds_text, share_text
 
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")
-"""Told apart by colour-blind readers [Okabe and Ito 2008]; beyond seven they come again, hatched, and every bar has its name."""
+"""Colours for colour-blind readers [Okabe and Ito 2008]; beyond seven they repeat, hatched, and every bar has its name."""
 HATCHES = ("", "///", "...", "xxx")
 _REST = "#d9d9d9"
 
 
 def effect_stack(table: Any, axes: Any = None) -> Any:
-    """`ComparisonTable.stack`: two panels, a row an effect in both; the first is one evaluation, cut into what each effect costs."""
+    """Plot `ComparisonTable.stack`: two panels with a row per effect; the first divides one evaluation among the effects."""
     rows = [row for row in table if len(row["left out"]) == 1 and not row["together"]]
     if axes is None:
         import matplotlib.pyplot as plt
@@ -41,7 +41,7 @@ def _style(i: int) -> dict[str, Any]:
 
 
 def _costs(ax: Any, table: Any, rows: list[dict[str, Any]]) -> None:
-    """Bars that go on where the one above ends: of an evaluation, what it is faster without each effect; the rest is what stays."""
+    """Draw bars, each beginning where the one above ends: the time saved in an evaluation without each effect, then the rest."""
     end = 0.0
     whole = next(row["evaluation"] for row in table if not row["left out"])
     for i, row in enumerate(rows):
@@ -59,11 +59,11 @@ def _costs(ax: Any, table: Any, rows: list[dict[str, Any]]) -> None:
     ax.text(place[0], len(rows), place[1] + share_text(rest), va="center", ha=place[2], fontsize=8, color="k")
     ax.set_xlim(0, 100 * max(1.0, end) * 1.14)
     ax.set_xlabel(f"share of an evaluation, {seconds_text(whole)} (%)")
-    ax.set_title(f"{table.title}\nwhat each effect costs", fontsize="medium", loc="left")
+    ax.set_title(f"{table.title}\ncost of each effect", fontsize="medium", loc="left")
 
 
 def _changes(ax: Any, table: Any, rows: list[dict[str, Any]]) -> None:
-    """Bars on a logarithmic axis: the error of the trajectory without each effect; hollow where it is below the run's own error."""
+    """Draw bars on a logarithmic axis: the error of the trajectory without each effect; hollow if below the run's own error."""
     floor = table.own_error
     there = [(i, row) for i, row in enumerate(rows) if not row["refused"]]
     errors = above_zero(max(row["trajectory"], floor) for _, row in there)
@@ -75,8 +75,8 @@ def _changes(ax: Any, table: Any, rows: list[dict[str, Any]]) -> None:
         ax.text(error, i, f" {table.cell('trajectory', row)};  v̇ by {table.cell('acceleration', row)}", va="center", fontsize=8)
     for i, row in enumerate(rows):
         if row["refused"]:
-            ax.text(0.01, i, "not without it", va="center", fontsize=8, style="italic", transform=ax.get_yaxis_transform())
+            ax.text(0.01, i, "does not run without it", va="center", fontsize=8, style="italic", transform=ax.get_yaxis_transform())
     low, high = (min(errors), max(errors)) if len(errors) else (1.0, 1.0)
     ax.set(xscale="log", xlim=(low / 30, high * 10 ** (1.5 + 0.6 * float(high > 100 * low))))
     ax.set_xlabel("change of the trajectory without it (rad, m; rms)")
-    ax.set_title("what each changes; hollow: less than the run's own error", fontsize="medium", loc="left")
+    ax.set_title("change by each effect; hollow: less than the run's own error", fontsize="medium", loc="left")

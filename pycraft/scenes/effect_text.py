@@ -1,4 +1,4 @@
-"""Effects in one line, as a command line has them: "gravity", "damping:0.1", "spring:2,rest=0.1,hinges=arm_*"."""
+"""Effects as one line of text, for the command line: "gravity", "damping:0.1", "spring:2,rest=0.1,hinges=arm_*"."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ _OPEN, _CLOSE = "[{", "]}"
 
 
 def add_from_text(scene: Any, text: str, label: str) -> None:
-    """Add the effect that a text says to a scene.
+    """Add an effect given as text to a scene.
 
-    A kind, and after a colon its parameters: first those without names, in their order, then name=value; `name` is that of the effect.
-    Values are as in TOML ("0.1", "[1, 2]", '{ in_time = "Harmonic", ... }'), and texts need no quotes.
+    The text is a kind and, after a colon, its parameters: first values in order, then name=value; `name` is the name of the effect.
+    Values as in TOML ("0.1", "[1, 2]", '{ in_time = "Harmonic", ... }'); texts need no quotes.
 
     Parameters
     ----------
     text : "damping:0.1"
-    label : what errors call it: "--effect damping:0.1"
+    label : its name in errors: "--effect damping:0.1"
 
     Raises
     ------
     ModelError
-        What the text gets wrong, with the remedy.
+        The text is invalid; the message gives the remedy.
     """
     kind, _, rest = text.partition(":")
     place = PlainData(label)
@@ -41,10 +41,10 @@ def add_from_text(scene: Any, text: str, label: str) -> None:
         found = re.match(r"\s*([A-Za-z_]\w*)\s*=(?!=)(.*)", part, re.DOTALL)
         if found is None and named:
             raise place.error(
-                (), f"{part.strip()!r} has no name and stands behind one that has; write {names[min(i, len(names) - 1)]}={part.strip()}"
+                (), f"{part.strip()!r} has no name but follows a named parameter; write {names[min(i, len(names) - 1)]}={part.strip()}"
             )
         if found is None and i >= len(names):
-            raise place.error((), f"{kind.strip()} has {len(names)} parameters, {', '.join(names)}; {part.strip()!r} is one more")
+            raise place.error((), f"{kind.strip()} has only {len(names)} parameters, {', '.join(names)}; remove {part.strip()!r}")
         name, value = (names[i], part) if found is None else found.groups()
         named = found is not None
         if name in data:
@@ -54,7 +54,7 @@ def add_from_text(scene: Any, text: str, label: str) -> None:
 
 
 def _parts(text: str) -> list[str]:
-    """What stands between commas that are in no bracket and no quotes."""
+    """Split at commas outside brackets and quotes."""
     parts, depth, quote, begin = [], 0, "", 0
     for i, letter in enumerate(text):
         if quote:
@@ -70,7 +70,7 @@ def _parts(text: str) -> list[str]:
 
 
 def _value(text: str) -> Any:
-    """As TOML has it; what is none is a text."""
+    """Return a TOML value; anything else is a text."""
     try:
         found = tomllib.loads(f"value = {text}")
         return found["value"] if len(found) == 1 else text

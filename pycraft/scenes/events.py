@@ -1,4 +1,4 @@
-"""Events: functions whose zeros are looked for along a run."""
+"""Events: functions whose zeros are located along a run."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Event:
     Parameters
     ----------
     function : callable (t, state) -> float
-        `state` is an `EffectState`, as effects in Python see it.
+        `state` is an `EffectState`, as for effects in Python.
     direction : {0, 1, -1} or {"both", "rising", "falling"}
-        Of the function where it counts.
+        Direction of the zero crossings that count.
     terminal : bool
-        Whether the run ends there.
+        True ends the run at the event.
     name : str
-        The function's by default.
+        Default: the function's name.
 
     Examples
     --------
@@ -60,8 +60,8 @@ class EventStates:
 
 
 def listed_events(given: Any) -> list[Event]:
-    """The events that a user gives: None, one or several of them; functions, which may have SciPy's attributes `terminal`, `direction`; a
-    dictionary by name. EvaluationError for what is no function, for directions that are none and for names that are taken twice."""
+    """Return a user's events as a list: None, one or several; functions, which may have SciPy's attributes `terminal`, `direction`; a
+    dictionary by name. Raises EvaluationError for other objects, unknown directions and repeated names."""
     if given is None:
         return []
     if isinstance(given, Mapping):
@@ -74,25 +74,25 @@ def listed_events(given: Any) -> list[Event]:
     for name, each in pairs:
         event = each if isinstance(each, Event) else Event(each, getattr(each, "direction", 0), bool(getattr(each, "terminal", False)))
         if not callable(event.function):
-            raise _core.EvaluationError(f"events: an event is a function (t, state) -> float, not {event.function!r:.80}")
+            raise _core.EvaluationError(f"events: an event must be a function (t, state) -> float, not {event.function!r:.80}")
         if not isinstance(event.direction, (str, int, float, np.integer)) or event.direction not in (*DIRECTIONS, *DIRECTIONS.values()):
             raise _core.EvaluationError(f"events: direction={event.direction!r:.80}; there are 0, 1, -1, 'both', 'rising' and 'falling'")
         called = name if name is not None else event.name if event.name is not None else unused(kind_of(event.function), events)
         if any(other.name == called for other in events):
-            raise _core.EvaluationError(f"events: two are called {called!r}")
-        direction = int(DIRECTIONS.get(event.direction, event.direction))  # type: ignore[arg-type]  # one of the two by now
+            raise _core.EvaluationError(f"events: two events are called {called!r}; give each its own name")
+        direction = int(DIRECTIONS.get(event.direction, event.direction))  # type: ignore[arg-type]  # checked above
         events.append(Event(event.function, direction, event.terminal, text(called, "an event")))
     return events
 
 
 def unused(name: str, events: list[Event]) -> str:
-    """The name, with a number where it is taken."""
+    """Return the name, with a number if it is used already."""
     taken = {event.name for event in events}
     return next(n for n in (name, *(f"{name}_{i}" for i in range(2, len(events) + 3))) if n not in taken)
 
 
 class CalledEvent:
-    """An event as the core calls it."""
+    """An event, adapted to the core."""
 
     def __init__(self, model: Any, function: Callable[[float, EffectState], float]):
         self.model, self.function = model, function
@@ -102,5 +102,5 @@ class CalledEvent:
 
 
 def events_for_core(model: Any, events: list[Event]) -> list[tuple[str, CalledEvent, int, bool]]:
-    """(name, call, direction, terminal) of each."""
+    """Return (name, call, direction, terminal) of each event."""
     return [(str(e.name), CalledEvent(model, e.function), int(e.direction), e.terminal) for e in events]

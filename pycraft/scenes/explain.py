@@ -7,7 +7,7 @@ from typing import Any
 
 
 def plan_text(model: str, passes: Sequence[tuple[str, str, list[str]]], off: Sequence[str], how: Sequence[Any]) -> str:
-    """Passes with what each does and why it is there; then what is off."""
+    """Return the passes with the work and the reason of each; then the effects that are off."""
     form, refine, _, precision = how
     rows = [("pass", "what", "because of"), *((name, what, ", ".join(because) or "always") for name, what, because in passes)]
     widths = [max(len(row[i]) for row in rows) for i in range(2)]

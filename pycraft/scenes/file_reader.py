@@ -1,4 +1,4 @@
-"""Scenes from TOML files and from plain data; what is wrong is an error with file, line, effect and key."""
+"""Scenes from TOML files and from plain data. Errors name file, line, effect and key."""
 
 from __future__ import annotations
 
@@ -18,46 +18,46 @@ from .file_format import FORMAT, HOW, IN_TIME, RUN, SCENE, effect_kind, field_na
 
 _OF_ENTRY = ("effect", "name", "on")
 _BASE = ("node_a", "node_b")
-"""Parameters that a file leaves out for the base."""
+"""Parameters that a file omits for the base."""
 _RUN_UNITS = {"T": "in seconds", "rtol": "a tolerance", "atol": "a tolerance", "step": "in seconds", "every": "in seconds"}
 
 
 class PlainData:
-    """Plain data in the place of a file: errors say which part of it is meant."""
+    """Plain data instead of a file: errors name the part of the data."""
 
     def __init__(self, path: str = "a scene's data"):
         self.path = path
 
     def at(self, place: tuple[str | int, ...]) -> str:
-        """Where a value is: "a scene's data, effects[1].stiffness"."""
+        """Return the place of a value: "a scene's data, effects[1].stiffness"."""
         parts = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
         return f"{self.path}, {parts}" if parts else self.path
 
     def error(self, place: tuple[str | int, ...], text: str) -> Exception:
-        """A ModelError to raise."""
+        """Return a ModelError to raise."""
         return _core.ModelError(f"{self.at(place)}: {text}")
 
 
 def load_scene(path: str | os.PathLike[str]) -> Any:
-    """The scene of a TOML file, as `Scene.save` writes it or a person does (docs/scenes.md, Files).
+    """Load the scene of a TOML file, written by `Scene.save` or by hand (docs/scenes.md, Files).
 
     Parameters
     ----------
-    path : path of the file; the path of a model in it is relative to its folder
+    path : path of the file; the path of a model in the file is relative to the file's folder
 
     Returns
     -------
-    Scene : its model is at the state that the file says, at zero where it says none
+    Scene : its model is at the state in the file, or at zero if the file has none
 
     Warns
     -----
     ModelWarning
-        What is worth one about the model, and about numbers of effects.
+        Doubtful data of the model, and doubtful values of effects.
 
     Raises
     ------
     ModelError
-        Whatever the file gets wrong, with file, line, effect or key, and remedy.
+        Any error in the file, with file, line, effect or key, and the remedy.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def load_scene(path: str | os.PathLike[str]) -> Any:
 
 
 def read_scene(file: Any, data: Any, folder: Path, name: str) -> Any:
-    """The scene that a file's tables, or plain data, hold."""
+    """Return the scene in a file's tables or in plain data."""
     from .scene import Scene
 
     table = TomlTable(file, data, (), "a scene", SCENE)
@@ -84,7 +84,7 @@ def read_scene(file: Any, data: Any, folder: Path, name: str) -> Any:
         raise table.error(_spoken_of(str(error), table, HOW), f"a scene: {error}") from None
     if (run := table.table("run", RUN, "the run")) is not None:
         scene.run_options = _run(run)
-    for entry in table.tables("effects", None, "effect", named=True) or []:  # type: ignore[arg-type]  # any keys, until its kind is known
+    for entry in table.tables("effects", None, "effect", named=True) or []:  # type: ignore[arg-type]  # all keys, until its kind is known
         _add(scene, entry)
     return scene
 
@@ -92,7 +92,7 @@ def read_scene(file: Any, data: Any, folder: Path, name: str) -> Any:
 def _model(table: TomlTable, folder: Path, name: str) -> Any:
     if "model" not in table:
         raise table.error(
-            None, 'a scene has no model; name one: model = "panda", model = "arm.toml", or write it as tables, [[model.bodies]]'
+            None, 'the scene has no model; name one: model = "panda", model = "arm.toml", or write it as tables, [[model.bodies]]'
         )
     given = table.data["model"]
     named = isinstance(given, str) or (isinstance(given, Mapping) and ("path" in given or "robot" in given))
@@ -115,25 +115,25 @@ def _run(table: TomlTable) -> dict[str, Any]:
         if key == "integrator":
             options[key] = table.choice(key, integrator_names(), "")
         elif not (number := table.number(key, 0.0, _RUN_UNITS[key])) > 0:
-            raise table.error(key, f"the run: {key} = {number:g}; it is positive, {_RUN_UNITS[key]}")
+            raise table.error(key, f"the run: {key} = {number:g}; it must be positive, {_RUN_UNITS[key]}")
         else:
             options[key] = number
     return options
 
 
 def enter(scene: Any, data: Mapping[str, Any], place: PlainData) -> None:
-    """Add one effect to a scene, of the data of an entry of `effects`."""
-    _add(scene, TomlTable(place, data, (), "the effect", None))  # type: ignore[arg-type]  # says where, as a file does
+    """Add one effect to a scene, from the data of an entry of `effects`."""
+    _add(scene, TomlTable(place, data, (), "the effect", None))  # type: ignore[arg-type]  # gives the place, as a file does
 
 
 # Effects --------------------------------------------------------------------------------------------------------------
 
 
 def _add(scene: Any, entry: TomlTable) -> None:
-    """One effect, on or off."""
+    """Add one effect, on or off."""
     called = entry.text("effect", "")
     if not called:
-        raise entry.error(None, f'{entry.label} says no effect; write which one it is: effect = "Damping"')
+        raise entry.error(None, f'{entry.label} names no effect; add its kind, such as effect = "Damping"')
     try:
         kind = effect_kind(called)
     except _core.ModelError as error:
@@ -159,12 +159,12 @@ def _made(kind: type[Effect], entry: TomlTable, label: str) -> Effect:
         elif field.name in _BASE:
             given[field.name] = None
         elif field.default is MISSING and field.default_factory is MISSING:
-            raise entry.error(None, f"{label} ({kind.__name__}) has no {field.name}; give it one: {field.name} = ...")
+            raise entry.error(None, f"{label} ({kind.__name__}) needs {field.name}; write {field.name} = ...")
     return kind(**given)
 
 
 def _value(file: Any, value: Any, place: tuple[str | int, ...], label: str) -> Any:
-    """A parameter: as the file has it, but for functions of time, which are tables with `in_time`."""
+    """Return a parameter as in the file, except functions of time, which are tables with `in_time`."""
     if not isinstance(value, Mapping) or "in_time" not in value:
         return value
     table = TomlTable(file, value, place, label, None)
@@ -172,12 +172,12 @@ def _value(file: Any, value: Any, place: tuple[str | int, ...], label: str) -> A
     table = TomlTable(file, value, place, label, ("in_time", *field_names(kind)))
     for field in fields(kind):  # type: ignore[arg-type]  # functions of time are dataclasses
         if field.name not in table and field.default is MISSING:
-            raise table.error(None, f"{label}, a {kind.__name__}, has no {field.name}; give it one: {field.name} = ...")
+            raise table.error(None, f"{label}, a {kind.__name__}, needs {field.name}; write {field.name} = ...")
     return kind(**{key: item for key, item in value.items() if key != "in_time"})
 
 
 def _spoken_of(text: str, table: TomlTable, known: Any) -> str | None:
-    """The key of a table that an error speaks of: by its own name, or by a name that it holds."""
+    """Return the key of a table to which an error refers, by its own name or by a name in its value."""
     there = [key for key in known if key in table]
     for key in there:
         if key not in _OF_ENTRY and f" {key}" in f" {text}".replace("(", " ").replace("=", " "):
@@ -190,7 +190,7 @@ def _spoken_of(text: str, table: TomlTable, known: Any) -> str | None:
 
 
 def _texts(value: Any) -> list[str]:
-    """The texts within a value."""
+    """Yield the texts within a value."""
     if isinstance(value, str):
         return [value]
     items = [*value, *value.values()] if isinstance(value, Mapping) else value if isinstance(value, list) else []

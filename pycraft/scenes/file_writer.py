@@ -18,7 +18,7 @@ _HEAD = "# A scene of PyCraft: SI units and radians. docs/scenes.md, Files, says
 
 
 def scene_data(scene: Any, model: Any = None, folder: Path | None = None) -> dict[str, Any]:
-    """`Scene.to_dict`; a path to a model is relative to `folder`, the present one where left out."""
+    """Return `Scene.to_dict`; a path to a model is relative to `folder`, default the present one."""
     data: dict[str, Any] = {"format": FORMAT}
     inline = model is None
     if not inline:
@@ -39,7 +39,7 @@ def save(scene: Any, path: Any, model: Any) -> None:
     """`Scene.save`."""
     shown = path_text(path, "a scene")
     if not shown.lower().endswith(".toml"):
-        raise _core.ModelError(f"{shown}: a scene's file ends in .toml")
+        raise _core.ModelError(f"{shown}: the file of a scene must end in .toml")
     data = scene_data(scene, model, Path(shown).parent)
     data |= {key: Inline(value) for key, value in data.items() if key == "model" and _is_reference(value)}
     data["effects"] = [{key: _on_one_line(value) for key, value in effect.items()} for effect in data.get("effects", [])]
@@ -54,14 +54,14 @@ def _is_reference(value: Any) -> bool:
 
 
 def _on_one_line(value: Any) -> Any:
-    """Tables within an effect or a body are written on its own line."""
+    """Write tables within an effect or a body on its own line."""
     if isinstance(value, Mapping):
         return Inline({key: _on_one_line(item) for key, item in value.items()})
     return [_on_one_line(item) for item in value] if isinstance(value, list) else value
 
 
 def _checked_reference(scene: Any, reference: Any, folder: Path) -> Any:
-    """A model's path or a robot's name, or a table of it with options, which is the scene's model."""
+    """Check that a model's path, a robot's name, or a table of either with options, refers to the scene's model."""
     if isinstance(reference, os.PathLike):
         reference = os.fspath(reference)
     found, _ = referred_model(reference, folder)
@@ -73,12 +73,12 @@ def _checked_reference(scene: Any, reference: Any, folder: Path) -> Any:
 
 
 def _effects(scene: Any) -> list[dict[str, Any]]:
-    """The effects as plain data. ModelError that names all that no file can hold."""
+    """Return the effects as plain data. Raises ModelError that names all effects that no file can hold."""
     written, refused = [], []
     for name, (effect, on) in scene._entries.items():
         try:
             if type(effect) is not KINDS.get(type(effect).__name__):
-                raise _core.ModelError("it is no effect of the library")
+                raise _core.ModelError("it is not an effect of the library")
             data = effect.to_dict()
         except _core.ModelError:
             refused.append(f"{name!r} ({type(effect).__name__})")
@@ -88,7 +88,7 @@ def _effects(scene: Any) -> list[dict[str, Any]]:
         written.append(entry | {key: value for key, value in data.items() if value is not None})
     if refused:
         raise _core.ModelError(
-            f"no file holds functions or classes of Python's, as of {', '.join(refused)}: give numbers over time as pc.effects.Table, "
-            "Spline or Harmonic; what is left, remove from the scene and add again when the file is loaded"
+            f"a file cannot hold Python functions or classes, as in {', '.join(refused)}: give values over time as pc.effects.Table, "
+            "Spline or Harmonic; remove the other effects before saving, and add them again after loading"
         )
     return written

@@ -1,4 +1,4 @@
-"""The faces of a scene that lead to files and plain data."""
+"""Methods of a scene for files and plain data."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ..models.loaders.toml_file import nearest
 
 
 class Filed:
-    """A scene to plain data and TOML, and back."""
+    """Conversion of a scene to plain data and TOML, and back."""
 
     _run_options: Mapping[str, Any] = {}
 
     @property
     def run_options(self) -> dict[str, Any]:
-        """What `pycraft run` takes where its command line says nothing, and a file holds in [run]: "T" (s), "integrator", "rtol", "atol",
-        "step" (s), "every" (s between the states that are kept). `simulate` takes its own arguments alone. Can be set.
+        """Defaults of `pycraft run` for this scene, stored in a file's [run]: "T" (s), "integrator", "rtol", "atol",
+        "step" (s), "every" (s between kept states). `simulate` uses only its own arguments. Can be set.
         """
         return dict(self._run_options)
 
@@ -28,23 +28,23 @@ class Filed:
         from .file_format import RUN
 
         if not isinstance(options, Mapping):
-            raise _core.ModelError(f"run_options: a dictionary with some of {', '.join(RUN)}, not {options!r:.80}")
+            raise _core.ModelError(f"run_options must be a dictionary with some of {', '.join(RUN)}, not {options!r:.80}")
         if unknown := [key for key in options if key not in RUN]:
             raise _core.ModelError(f"run_options has no {unknown[0]!r}; {nearest(str(unknown[0]), RUN)}")
         self._run_options = dict(options)
 
     def to_dict(self, model: Any = None) -> dict[str, Any]:
-        """The scene as plain data: numbers, texts, lists and dictionaries, with the keys of its file.
+        """Return the scene as plain data: numbers, texts, lists and dictionaries, with the keys of its file.
 
         Parameters
         ----------
         model : path of the model's file or name of a robot of the package, or a dictionary of either with options
-            What names the model, which must be that of the scene; the model itself is in the data where left out.
+            Reference to the model, which must equal the scene's; by default the data contain the model itself.
 
         Raises
         ------
         ModelError
-            Effects that hold a function of Python's, by name; a `model` that is another one.
+            Effects with a Python function, by name; a `model` that differs from the scene's.
 
         Examples
         --------
@@ -61,23 +61,23 @@ class Filed:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Any:
-        """The scene that `to_dict` describes. ModelError says which part of the data is wrong, and the remedy."""
+        """Return the scene described by `to_dict`. ModelError names the wrong part of the data, and the remedy."""
         from .file_reader import PlainData, read_scene
 
         return read_scene(PlainData(), data, Path(), "model")
 
     def save(self, path: str | os.PathLike[str], *, model: Any = None) -> None:
-        """Write the scene to a TOML file that a person reads and writes, and `pycraft.load_scene` reads back bit for bit.
+        """Write the scene to a readable TOML file, which `pycraft.load_scene` reads back bit for bit.
 
         Parameters
         ----------
-        path : path of the file, ending in ".toml"; a file that is there is replaced
+        path : path of the file, ending in ".toml"; an existing file is replaced
         model : as in `to_dict`; a path is relative to the folder of the scene's file
 
         Raises
         ------
         ModelError
-            As `to_dict`; another ending; a file that cannot be written.
+            As for `to_dict`; another ending; a file that cannot be written.
         """
         from .file_writer import save
 

@@ -1,4 +1,4 @@
-"""Scenes linearized near states and along runs: their effects included."""
+"""Linearization of scenes near states and along runs, including their effects."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ def _along(
     )
     for name, x, axes in (("q", q, 2), ("v", v, 2), ("t", times, 1), ("states", own, 2)):
         if x.ndim > axes or (x.ndim == axes and len(x) != count):
-            raise _core.ModelError(f"{name} of {scene.model.name!r} has the shape {x.shape}; there are {count} states, or one for all")
+            raise _core.ModelError(f"{name} of {scene.model.name!r} has the shape {x.shape}; give {count} states, or one for all")
     q, v, own = (np.broadcast_to(x, (count, x.shape[-1])) for x in (q, v, own))
     times = np.broadcast_to(times, (count,))
-    if not count:  # the sizes of one
+    if not count:  # a batch of none: use the sizes of one
         q0 = scene.model.zero_q()
         q0 = scene.model.assemble(q0).q if scene._keeps_loops() else q0
         one = _at(scene, calls, q0, np.zeros(scene.model.nv), 0.0, np.zeros(own.shape[-1]), chosen, names, outputs, independent)
@@ -77,7 +77,7 @@ def _at(
     for column, j in enumerate(chosen):
         given[j, column] = 0.0 if j in known else 1.0
     if scene._keeps_loops():
-        given[:nv] = np.eye(nv)[:, chosen]  # what is prescribed takes what acts there
+        given[:nv] = np.eye(nv)[:, chosen]  # prescribed coordinates absorb forces on them
         mass, along_q, along_rest = found["mass"], found["along_q"], found["along_rest"]
         tree = TreeDerivatives(mass, along_q, along_rest, given, found["v"], found["rates"], found["forces"])
         return linear_model_on_loops(kept_rows(model, found["q"], scene._kept_loops(), known), tree, names, outputs, independent, t)
@@ -88,12 +88,12 @@ def _at(
 
 
 def known_coordinates(found: dict[str, Any]) -> list[int]:
-    """Of `_core.scene_linearized`: the coordinates that go where they are told."""
+    """Return the prescribed coordinates, from `_core.scene_linearized`."""
     return [j for j, held in enumerate(found["known"]) if held]
 
 
 def solved(found: dict[str, Any], given: np.ndarray) -> np.ndarray:
-    """Of `_core.scene_linearized`: derivatives of (v̇, ẏ) along displacements, (v, y), and generalized forces `given` as columns."""
+    """Return derivatives of (v̇, ẏ) along displacements, (v, y), and generalized forces `given`, as columns."""
     sides = np.hstack([found["along_q"], found["along_rest"], given])
     slopes = np.linalg.solve(found["mass"], sides) if len(sides) else sides
     slopes[known_coordinates(found)] = 0.0

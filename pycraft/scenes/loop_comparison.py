@@ -1,4 +1,4 @@
-"""What keeping loops costs: by tree augmentation, by constraint embedding, and held by springs; drift, energy and error against time."""
+"""Cost of keeping loops, by tree augmentation, by constraint embedding, and by springs: drift, energy and error against time."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from .scene_accuracy import _as, _at_states, _by, _options
 METHODS = ("augment", "embed", "penalty")
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 KEPT, HELD = ("dopri5", "dop853"), ("dopri5", "rosenbrock4")
-"""Integrators, of loops that are kept; of springs, which are stiff."""
+"""Default integrators for kept loops, and for springs, which are stiff."""
 STIFFER = (10.0, 30.0, 100.0, 300.0, 1000.0)
-"""Frequencies of springs, by the rate of the motion."""
+"""Frequencies of springs, as multiples of the rate of the motion."""
 REFERENCE = ("dop853", 1e-13)
 LEAST = 1e-12
-"""Of tolerances of what springs hold."""
+"""Least tolerance of runs with springs."""
 
 
 class LoopsTable(WorkPrecisionTable):
@@ -38,8 +38,8 @@ class LoopsTable(WorkPrecisionTable):
 
     Each row is a dictionary with the columns of `WorkPrecisionTable`, of which "drift" is the largest residual of the loops' rows (m, rad)
     at the sampled times, and: "method" ("augment", "embed", "penalty"), "frequency" (rad/s, of penalties), "velocity drift" (the largest
-    |Q v|, m/s and rad/s), "energy error" (the largest change of kinetic and potential energy less works, without what springs and dampers
-    hold and take, over the largest kinetic energy of the reference; None where nothing moves), "pareto" (no other row is faster and more
+    |Q v|, m/s and rad/s), "energy error" (the largest change of kinetic and potential energy less works, without the energy in springs and
+    dampers of loops, over the largest kinetic energy of the reference; None if nothing moves), "pareto" (no other row is faster and more
     accurate).
     """
 
@@ -86,7 +86,7 @@ class LoopsTable(WorkPrecisionTable):
         return f"{self.cell('way', row)} at {self.cell('tolerance', row)}{springs}"
 
     def plot(self, axes: Any = None) -> Any:
-        """Three panels, error of the trajectory, drift of the rows and energy error, each against the time of a run; returns the axes."""
+        """Plot three panels, error of the trajectory, drift of the rows and energy error, each against run time; return the axes."""
         from .cost_pictures import loops_plot
 
         return loops_plot(self, axes)
@@ -107,30 +107,31 @@ def loops_compared(
     seconds: float = 0.05,
     progress: Callable[[str], None] | None = None,
 ) -> LoopsTable:
-    """The loops of a scene kept by augmentation, kept by embedding, and held by springs: what each costs, and how exact it is.
+    """Compare the methods that keep the loops of a scene, augmentation, embedding and springs: cost and accuracy of each.
 
-    The scene's `effects.Loop` are put in by each method in turn, everything else stays as it is. Rows are runs: of loops that are kept one
-    an integrator and tolerance; of springs one an integrator and frequency ω, at a tolerance of a tenth of what springs leave,
-    (rate/ω)²/10, where rate is that of the motion, the largest ‖v̇‖/‖v‖ in kinetic energy.
+    The scene's `effects.Loop` use each method in turn; everything else is unchanged. Rows are runs: for kept loops one
+    per integrator and tolerance; for springs one per integrator and frequency ω, at a tolerance of a tenth of the springs' error,
+    (rate/ω)²/10, where rate is the rate of the motion, the largest ‖v̇‖/‖v‖ in kinetic energy.
 
-    The reference is augmentation by dop853 in extended precision at a tolerance of 1e-13 (embedding where that refuses, double where
-    functions of Python's say so). Its own error is its distance to a run at a hundred times that tolerance, to the same by the other
-    method, and to the motion that an extrapolation method finds; rows below it are not resolved. The table says to how many digits the
+    The reference is augmentation by dop853 in extended precision at a tolerance of 1e-13 (embedding if that refuses, double if
+    Python functions require it). Its own error is its distance to a run at a hundred times that tolerance, to the same by the other
+    method, and to the motion by an extrapolation method; rows below it are not resolved. The table gives the number of digits to which the
     last agrees with the reference.
 
     Parameters
     ----------
-    scene : with an `effects.Loop` that is on; couplings and rows of velocities are loops as others
+    scene : with an `effects.Loop` that is on; couplings and rows of velocities count as loops
     q, v : (nq,), (nv,) at t = 0 on the loops, by the rule of direct calls
-    T : s, of the run
-    methods : of "augment", "embed", "penalty"
-    integrators : as in `simulate`; "dopri5" and "dop853" of loops that are kept, "dopri5" and "rosenbrock4" of springs
-    tolerances, steps : of controlled integrators, rtol and atol, of loops that are kept; s, of integrators with steps of one size
-    frequencies, damping_ratio : rad/s, of `effects.Loop(method="penalty")`; 10, 30, 100, 300 and 1000 times the rate of the motion
-    seconds : a run is repeated until this is spent, once at least; the least time counts
-    progress : called with what is run next
+    T : s, duration of the run
+    methods : some of "augment", "embed", "penalty"
+    integrators : as in `simulate`; default: "dopri5" and "dop853" for kept loops, "dopri5" and "rosenbrock4" for springs
+    tolerances, steps : rtol and atol of controlled integrators, for kept loops; steps, s, of integrators with fixed steps
+    frequencies, damping_ratio : rad/s, for `effects.Loop(method="penalty")`; default: 10, 30, 100, 300 and 1000 times the rate of the
+        motion
+    seconds : time over which a run is repeated, at least once; the least time counts
+    progress : called with the name of the next run
 
-    A name or number stands for a list of one.
+    A single name or number counts as a list of one.
 
     Returns
     -------
@@ -139,9 +140,9 @@ def loops_compared(
     Raises
     ------
     ModelError
-        A scene that keeps no loops; a state off them.
+        A scene that keeps no loops; a state off the loops.
     EvaluationError
-        Names that are not there, numbers that are not positive; a reference that neither method gives, with the reasons.
+        Unknown names, values that are not positive; no reference by either method, with the reasons.
 
     Examples
     --------
@@ -151,7 +152,7 @@ def loops_compared(
     (['augment', 'embed', 'penalty'], [True, True, False])
     """
     if not isinstance(scene, Scene):
-        raise _core.ModelError(f"loops are compared of a scene, not of {scene!r:.80}")
+        raise _core.ModelError(f"loops_compared takes a scene, not {scene!r:.80}")
     model, seconds = scene.model, checked_seconds(seconds)
     checked_model(model, "a comparison of loops")
     if not scene._keeps_loops():
@@ -165,7 +166,7 @@ def loops_compared(
     if frequencies is not None:
         frequencies = checked_positive(frequencies, "frequencies", "a positive, finite number of rad/s")
     if not 0 <= (ratio := one_number(damping_ratio, "damping_ratio")) < np.inf:
-        raise _core.EvaluationError(f"damping_ratio={ratio:g}: a finite number, zero or more")
+        raise _core.EvaluationError(f"damping_ratio={ratio:g}: give a finite number, zero or more")
     comparison = _Comparison(scene, *at_state(model, q, v), sampled_times(length), seconds, progress or (lambda _: None))
     comparison.find_reference()
     rows = []
@@ -202,7 +203,7 @@ class _Comparison:
         self.rows = [i for name in self.names for i in rows[loops[name].slice]]
 
     def by(self, method: str, of: Any, **springs: Any) -> tuple[Any, list[str]]:
-        """The scene with its loops by a method, and the names of the effects that do that."""
+        """Return the scene with its loops kept by a method, and the names of the effects that keep them."""
         other = _as(of, of._how)
         own = [name for name, (effect, on) in of._entries.items() if on and isinstance(effect, Loop) and effect.keeps]
         for name in own:
@@ -213,7 +214,7 @@ class _Comparison:
 
     # ------------------------------------------------------------------ the reference
     def find_reference(self) -> None:
-        """The tightest run, its error, the rate of its motion and its kinetic energy."""
+        """Find the tightest run, its error, the rate of its motion and its kinetic energy."""
         self.tell("reference")
         plain, refused = _at_states(self.scene), []
         for precision in ("extended", "double"):
@@ -224,7 +225,7 @@ class _Comparison:
                 try:
                     runs[method] = self._tight(other, 1.0)
                     runs.setdefault("looser", self._tight(other, 100.0))
-                except _core.ModelError:  # a state off the loops, names that are gone
+                except _core.ModelError:  # a state off the loops, or removed names
                     raise
                 except (ArithmeticError, _core.Error) as reason:
                     refused.append(f"{method} in {precision} precision: {reason}")
@@ -254,7 +255,7 @@ class _Comparison:
 
     # ------------------------------------------------------------------ a row
     def row(self, method: str, integrator: str, options: dict[str, float], **springs: Any) -> dict[str, Any]:
-        """One run, measured."""
+        """Return the row of one measured run."""
         self.tell(", ".join(map(str, (method, integrator, *options.values(), *springs.values()))))
         about = {"method": method, "frequency": springs.get("frequency"), "velocity drift": None, "energy error": None}
         scene, own = self.by(method, self.scene, **springs)
@@ -278,7 +279,7 @@ class _Comparison:
         return float(np.abs(np.einsum("trj,tj->tr", Q, run.v)).max(initial=0.0))
 
     def _energy(self, run: Any, own: list[str]) -> float | None:
-        """The largest change of what there is without the springs."""
+        """Return the largest change of the energy without the springs."""
         if not self.kinetic > 0:
             return None
         others = [i for i, name in enumerate(run.effects) if name not in own]

@@ -1,4 +1,4 @@
-"""Lost digits along a run, as colour on the robot: where its forward dynamics loses them, and what the next rung up costs."""
+"""Lost digits along a run, as colour on the robot: where its forward dynamics loses them, and the cost of the next rung."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from ..tidy import error_text
 from ..view.plane_layout import PlaneLayout, model_layouts
 
 MOST = 200
-"""States of a run that are looked at, each with a certificate of its own."""
+"""Largest number of examined states of a run, each with its own certificate."""
 _WIDTH, _HEIGHT, _RADIUS = 420.0, 320.0, 7.0
 _PLOT_WIDTH, _PLOT_HEIGHT, _LEFT, _FOOT = 420.0, 150.0, 34.0, 30.0
 _NONE, _ALL = np.array([222, 235, 247]), np.array([165, 60, 0])
-"""Colours of no digit lost and of all: they differ in lightness, so that all readers tell them apart."""
+"""Colours for no digits lost and all digits lost; they differ in lightness, for all readers."""
 _DIGITS = 16.0
 
 
 class LostDigits:
-    """`Run.lost_digits`: at some states of a run the decimal digits that are gone in D(k) at each hinge, and a certificate.
+    """`Run.lost_digits`: at some states of a run, the decimal digits lost in D(k) at each hinge, and a certificate.
 
     Attributes
     ----------
     t : (n,) s
-    hinges : names, of those that have coordinates
+    hinges : names of the hinges with coordinates
     digits : (n, hinges)
-    certificates : list of Certificate, of the accelerations at each state
+    certificates : list of Certificate, for the accelerations at each state
 
     Examples
     --------
@@ -47,7 +47,7 @@ class LostDigits:
     def __init__(self, run: Any, states: Any, options: dict[str, Any]):
         count = one_number(states, "states")
         if not 1 <= count <= MOST or count != int(count):
-            raise _core.EvaluationError(f"states={states!r}: a whole number from 1 to {MOST}, of states that are looked at")
+            raise _core.EvaluationError(f"states={states!r}: give the number of examined states, a whole number from 1 to {MOST}")
         model = run._unedited_model()
         rows = np.unique(np.linspace(0, len(run.t) - 1, int(count)).round().astype(int))
         self.t, q, v, vdot = (x[rows] for x in (run.t, run.q, run.v, run.vdot))
@@ -66,11 +66,11 @@ class LostDigits:
 
     @property
     def worst(self) -> int:
-        """Which of the states has the largest error."""
+        """Index of the state with the largest error."""
         return int(np.argmax([one.error for one in self.certificates]))
 
     def told(self, i: int) -> str:
-        """What is known of one state, in a sentence or two: the error, where digits went, the next rung and its price."""
+        """Return a sentence or two on one state: the error, where digits were lost, the next rung and its cost."""
         one = self.certificates[i]
         lost = ""
         if len(self.hinges) and self.digits[i].max() >= 1:
@@ -85,7 +85,7 @@ class LostDigits:
         return f"<lost digits of {self._model.name!r} at {len(self.t)} states; worst at {self.told(self.worst)[4:]}>"
 
     def save(self, path: str | Path) -> Path:
-        """Write a page, ".html". EvaluationError for another ending, OSError if it cannot be written."""
+        """Write a page, ".html". Raises EvaluationError for another ending, OSError if it cannot be written."""
         target = writable_target(path, (".html",), "a page of lost digits")
         head = "<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><meta name='color-scheme' content='light dark'>"
         title = escape(f"lost digits of {self._model.name}")
@@ -107,7 +107,7 @@ class LostDigits:
         )
 
     def _frame(self, i: int) -> str:
-        """The robot at one state: discs deeper and larger where more digits are gone. The worst is the one that is seen at first."""
+        """Return the robot at one state: discs are darker and larger where more digits are lost. The worst state is shown first."""
         at = self._layouts[i]
         parts = [_line("bone", *ends) for ends in at.bones]
         parts += [_line("edge", at.bodies[k], at.bodies[p] if p >= 0 else at.base) for k, p in enumerate(self._parents)]
@@ -121,7 +121,7 @@ class LostDigits:
         return f"<g class='frame'{'' if i == self.worst else ' style=display:none'}>{''.join(parts)}</g>"
 
     def _plot(self) -> str:
-        """The most digits lost at any hinge over time, in decimal digits against seconds."""
+        """Return the plot of the most digits lost at any hinge, against seconds."""
         top = self.digits.max(axis=1, initial=0.0)
         span = float(self.t[-1] - self.t[0]) or 1.0
         x = _LEFT + (self.t - self.t[0]) / span * (_PLOT_WIDTH - _LEFT - 12)
@@ -152,7 +152,7 @@ def _colour(digits: float) -> str:
 
 
 def _legend() -> str:
-    """Discs of no digit to all of a double's."""
+    """Return discs from no digits to all digits of a double."""
     marks = (0, 4, 8, 12, 16)
     parts = [
         f"<circle class='body' cx='{30 + 70 * i}' cy='12' r='{_RADIUS * (0.8 + 0.6 * d / _DIGITS):.1f}' fill='{_colour(d)}'/>"

@@ -1,4 +1,4 @@
-"""The measuring faces of a scene: what it costs, what each effect buys, which matter, what accuracy costs."""
+"""Measurements of a scene: its cost, the value of each effect, the effects that matter, and the cost of accuracy."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
 
 
 class Measurements:
-    """What a scene measures of itself. Nothing of the scene is changed by it."""
+    """Measurements of a scene, which do not change the scene."""
 
     def cost(
         self, q=None, v=None, *, integrator: str = "dopri5", step: float | None = None, rtol: float = 1e-9, atol: float = 1e-12,
         seconds: float = 0.05, progress: Callable[[str], None] | None = None,
     ) -> CostTable:  # fmt: skip
-        """What the scene costs: seconds of every pass, of what a step spends beside them, and of every effect.
+        """Measure the cost of the scene: seconds of every pass, of the rest of a step, and of every effect.
 
-        An effect that is on costs what the scene is faster without it (what passes share, none of their effects costs alone); one that is
-        off, what the scene would be slower with it. Its share is of a step: of what a run takes for each of its evaluations.
+        The cost of an effect that is on is the time saved without it (the shared cost of a pass belongs to no single effect); of an effect
+        that is off, the time added with it. Shares are shares of a step: the time of a run per evaluation.
 
         Parameters
         ----------
-        q, v : (K, nq), (K, nv) or one state; five random ones where left out. Time is t = 0
-        integrator, step, rtol, atol : of the run whose steps are measured, as in `simulate`
-        seconds : spent on each figure; times are the least of several rounds in which everything has its turn
-        progress : called with what is measured next
+        q, v : (K, nq), (K, nv) or one state; default: five random states. Time is t = 0
+        integrator, step, rtol, atol : options of the measured run, as in `simulate`
+        seconds : time per measured value; times are the least of several rounds over all values
+        progress : called with the name of the next measurement
 
         Returns
         -------
@@ -53,28 +53,28 @@ class Measurements:
         self, without: Any = None, q=None, v=None, *, T: float = 1.0, integrator: str = "dopri5", step: float | None = None,
         rtol: float = 1e-9, atol: float = 1e-12, seconds: float = 0.05, progress: Callable[[str], None] | None = None,
     ) -> ComparisonTable:  # fmt: skip
-        """What each effect buys: the error that leaving it out makes, in accelerations and trajectory, against the time that it saves.
+        """Measure the value of each effect: the error of leaving it out, in accelerations and trajectory, against the time saved.
 
         Parameters
         ----------
         without : names of effects, or sets of them, e.g. ["friction", ("friction", "damping")]
-            A row each. Where left out: every effect that is on by itself, then those that matter least together.
+            One row each. Default: every effect that is on by itself, then sets of the effects that matter least.
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls
         T : s, of the run
-        integrator, step, rtol, atol : of all runs, as in `simulate`
-        seconds : spent on each time; times are the least of several rounds in which every row has its turn
-        progress : called with what is measured next
+        integrator, step, rtol, atol : options of all runs, as in `simulate`
+        seconds : time per measured value; times are the least of several rounds over all rows
+        progress : called with the name of the next measurement
 
         Returns
         -------
-        ComparisonTable : with the Pareto front of run's time and trajectory's error marked; `.front`, `.plot()`
+        ComparisonTable : with the Pareto front of run time and trajectory error marked; `.front`, `.plot()`
 
         Raises
         ------
         ModelError
-            Effects that are not there or off already.
+            Effects that do not exist or are already off.
         EvaluationError
-            T that is not positive; what `simulate` says of the whole scene. A scene that does not run without an effect is a refused row.
+            T that is not positive; errors of `simulate` for the whole scene. A scene that does not run without an effect is a refused row.
         """
         from .comparison import compare
 
@@ -85,24 +85,24 @@ class Measurements:
         self, tolerance: float, q=None, v=None, *, T: float | None = None, integrator: str = "dopri5", step: float | None = None,
         rtol: float = 1e-9, atol: float = 1e-12, progress: Callable[[str], None] | None = None,
     ) -> NeededTable:  # fmt: skip
-        """The effects that matter at a tolerance.
+        """Return the effects that matter at a tolerance.
 
-        Without T: where leaving an effect out changes accelerations by more than the tolerance, ‖δv̇‖ / ‖v̇‖, at one of the states. With T:
-        where it changes the trajectory by more, in rad and m, root mean square over coordinates, at one of the times. What is left out is
-        left out together: effects that matter by no more than the tolerance are dropped as long as all that are dropped do not either, the
-        least first.
+        Without T, an effect matters if leaving it out changes accelerations by more than the tolerance, ‖δv̇‖ / ‖v̇‖, at one of the states.
+        With T, it matters if the trajectory changes by more, in rad and m, root mean square over coordinates, at one of the times. Effects
+        are left out together: effects with changes up to the tolerance are dropped, least first, as long as all dropped effects together
+        stay within it.
 
         Parameters
         ----------
         tolerance : positive
-        q, v : without T: (K, nq), (K, nv) or one state, five random ones where left out; with T: (nq,), (nv,) at t = 0
-        T : s, of a run
-        integrator, step, rtol, atol : of runs, as in `simulate`
+        q, v : without T: (K, nq), (K, nv) or one state, default five random states; with T: (nq,), (nv,) at t = 0
+        T : s, duration of a run
+        integrator, step, rtol, atol : options of runs, as in `simulate`
         progress : called with what is measured next
 
         Returns
         -------
-        NeededTable : `.names` of those that matter, `.others`, a row for each
+        NeededTable : `.names` of the effects that matter, `.others`, a row for each effect
         """
         from .needed import needed
 
@@ -114,23 +114,24 @@ class Measurements:
         refinements: Any = None, precisions: Any = None, without: Any = None, seconds: float = 0.05,
         progress: Callable[[str], None] | None = None,
     ) -> SceneAccuracyTable:  # fmt: skip
-        """What accuracy costs in time, for this scene: error of a run's trajectory against its time, as each of three things is varied.
+        """Measure the cost of accuracy of this scene: error of a run's trajectory against its time, varying three things in turn.
 
-        Integrators and their tolerances or steps, of the scene as it is; forms, refinements and precisions, by an integrator of high order
-        at a tolerance near rounding; effects, each left out. The reference is everything in extended precision, as in
-        `pycraft.work_precision`, whose rows these are. Implicit effects, which act in steps, are in the reference and in rows of the
-        arithmetic what they come to in small steps: plain damping and springs.
+        Integrators and their tolerances or steps, with the scene as it is; forms, refinements and precisions, by an integrator of high
+        order at a tolerance near rounding; effects, each left out. The reference is computed in extended precision, as in
+        `pycraft.work_precision`, which also defines the rows. Implicit effects, which act in steps, are replaced in the reference and in
+        rows of the arithmetic by their limits for small steps: plain damping and springs.
 
         Parameters
         ----------
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls
         T : s, of the run
-        integrators : as in `simulate`; "dopri5", "dop853", "rkmk4"
-        tolerances, steps : of controlled integrators, rtol and atol; s, of those with steps of one size
-        forms, refinements, precisions : as in `pycraft.accuracy`; all forms, none and one with a wider residual, double and extended
-        without : effects or sets of them that are left out, as in `compare`; every one that is on
-        seconds : a run is repeated until this is spent, once at least; the least time counts
-        progress : called with what is run next
+        integrators : as in `simulate`; default: "dopri5", "dop853", "rkmk4"
+        tolerances, steps : rtol and atol of controlled integrators; steps, s, of integrators with fixed steps
+        forms, refinements, precisions : as in `pycraft.accuracy`; default: all forms, none and one with a wider residual, double and
+            extended
+        without : effects or sets of effects to leave out, as in `compare`; default: every effect that is on
+        seconds : time over which a run is repeated, at least once; the least time counts
+        progress : called with the name of the next run
 
         Returns
         -------
@@ -147,30 +148,30 @@ class Measurements:
         self, q=None, v=None, t: Any = None, *, states: Any = None, inputs: Any = None, outputs: Any = None, dt: float | None = None,
         method: str = "zoh", independent: Any = None,
     ) -> LinearModel:  # fmt: skip
-        """The linear model of the scene near a state, its effects included, or near each of a batch or a run (`scene.linearize(run)`).
+        """Return the linear model of the scene, including its effects, near a state, or each of a batch or a run (`scene.linearize(run)`).
 
         States, inputs and outputs are as in `Multibody.linearize`, and the effects' own states follow the velocities ("state.0", ...).
-        Inputs are generalized forces beside those of the effects. Exact: effects written in C++ by derivatives of their own arithmetic;
-        those in Python by central differences, of which about ten digits are right. At the edge of a stop or of a drive's limit they are
-        those of the side that the forces are of. Time itself is held, and so is what sampled controllers hold: their forces are constants
-        here, whatever the states, as between two samples. Prescribed motion goes on as prescribed:
-        its rows and columns are zero, and an input there moves nothing. Where effects keep loops the states are displacements and
-        velocities on them, in independent coordinates, as of `Multibody.linearize` with loops=True.
+        Inputs are generalized forces in addition to the effects'. Effects written in C++ are exact, by derivatives of their own arithmetic;
+        effects in Python use central differences, with about ten correct digits. At the edge of a stop or of a drive's limit, derivatives
+        are taken on the side of the present forces. Time is held, and so are the outputs of sampled controllers: their forces are constants
+        here, independent of the states, as between two samples. Prescribed motion continues as prescribed:
+        its rows and columns are zero, and an input there moves nothing. If effects keep loops, the states are displacements and
+        velocities on the loops, in independent coordinates, as for `Multibody.linearize` with loops=True.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
-        t : s, one number or one for each state; where left out that of the run that q is, else 0
-        states : (n,) or (B, n), of the effects' own; where left out those of the run that q is, else as they are at first
+        t : s, one number or one for each state; default: the times of a run given as q, else 0
+        states : (n,) or (B, n), the effects' own states; default: the states of a run given as q, else the initial ones
         inputs, outputs, dt, method, independent : as in `Multibody.linearize`
 
         Raises
         ------
         EvaluationError
-            A scene in another precision than double; a singular state of loops; nodes of a spring or damper at one place, where no side
-            has derivatives.
+            A scene in another precision than double; a singular state of loops; coinciding nodes of a spring or damper, where there are no
+            derivatives.
         ModelError
-            Names that are not there, another number of states; a state off the loops, coordinates that do not tell where the others are.
+            Unknown names, a wrong number of states; a state off the loops, coordinates that do not determine the others.
 
         Examples
         --------
@@ -185,32 +186,32 @@ class Measurements:
         return linearize(self, q, v, t, states=states, inputs=inputs, outputs=outputs, dt=dt, method=method, independent=independent)
 
     def quadratic_model(self, q=None, v=None, t: Any = None, *, states: Any = None, inputs: Any = None) -> QuadraticModel:
-        """The model of the scene to second order near a state, its effects included, or near each of a batch: what iLQR and DDP ask for.
+        """Return the second-order model of the scene, including its effects, near a state or each of a batch, as needed by iLQR and DDP.
 
-        `linearize` is its first order; `Multibody.quadratic_model` is the same of a model without effects. Exact: effects written in C++ by
-        second derivatives of their own arithmetic. Where one is written in Python all effects are differenced, centrally, with steps of
-        2⁻¹³: of functions of the size of their arguments 1e-7 is wrong. Time itself is held, but that a step of an integrator
-        (`discrete`) ends later; what is prescribed stays as it is told, and what controllers hold stays over a step.
+        `linearize` is its first order; `Multibody.quadratic_model` is the same for a model without effects. Effects written in C++ are
+        exact, by second derivatives of their own arithmetic. If one is written in Python, all effects use central differences with steps of
+        2⁻¹³: the error is about 1e-7 for functions of the size of their arguments. Time is held, except that a step of an integrator
+        (`discrete`) ends later; prescribed motion continues as prescribed, and outputs of controllers are held over a step.
 
         Parameters
         ----------
         q, v : (nq,), (nv,), each with an optional leading batch axis
-        t : s, one number or one for each state; where left out that of the run that q is, else 0
-        states : (n,) or (B, n), of the effects' own; where left out those of the run that q is, else as they are at first
-        inputs : names of hinges, coordinates or patterns, or a list of them, whose generalized forces are inputs; None: all
+        t : s, one number or one for each state; default: the times of a run given as q, else 0
+        states : (n,) or (B, n), the effects' own states; default: the states of a run given as q, else the initial ones
+        inputs : names of hinges, coordinates or patterns, or a list of them, with generalized forces as inputs; None: all
 
         Returns
         -------
-        QuadraticModel : `contracted(costate)` and `tensors()`, at O(N · n²) a state for n = 2 nv + own, `discrete(dt, integrator)`
+        QuadraticModel : `contracted(costate)` and `tensors()`, at O(N · n²) per state for n = 2 nv + own, `discrete(dt, integrator)`
 
         Raises
         ------
         EvaluationError
-            A scene that keeps loops, one in another precision than double, one that acts by impulses; an effect that has no second
-            derivatives at this state, by name: a coordinate just at its stop or at a limit of its drive, `QuadraticDamping` at rest,
-            nodes of a spring or damper at one place, a ball half a turn from its spring's rest.
+            A scene that keeps loops, uses another precision than double, or acts by impulses; an effect without second
+            derivatives at this state, by name: a coordinate exactly at its stop or at a limit of its drive, `QuadraticDamping` at rest,
+            coinciding nodes of a spring or damper, a ball half a turn from its spring's rest.
         ModelError
-            Names that are not there, another number of states.
+            Unknown names, a wrong number of states.
 
         Examples
         --------

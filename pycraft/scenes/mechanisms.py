@@ -1,4 +1,4 @@
-"""Scenes of mechanisms that everybody knows, ready to simulate: `pc.mechanisms.pendulum().simulate(10.0)`."""
+"""Scenes of well-known mechanisms, ready to simulate: `pc.mechanisms.pendulum().simulate(10.0)`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .scene import Scene
 DOWN = (0.0, 0.0, -9.81)
 """m/s²"""
 ALONG_Y = (0.0, -9.81, 0.0)
-"""m/s², of what moves in the plane of x and y"""
+"""Gravity, m/s², for mechanisms in the plane of x and y"""
 EARTH = 3.986004418e14
 """μ = G m of the Earth, m³/s² (IERS Conventions 2010)."""
 
@@ -24,17 +24,17 @@ EARTH = 3.986004418e14
 def _positive(**numbers: float) -> None:
     for name, value in numbers.items():
         if not 0 < float(value) < np.inf:
-            raise _core.ModelError(f"{name}={value}: a positive number")
+            raise _core.ModelError(f"{name}={value}: give a positive number")
 
 
 def _rod(length: float, mass: float, axis: int) -> dict[str, Any]:
-    """A thin rod along an axis from its hinge."""
+    """Return a thin rod along an axis from its hinge."""
     direction = np.eye(3)[axis]
     return {"mass": mass, "com": length / 2 * direction, "inertia": mass * length**2 / 12 * (np.eye(3) - np.diag(direction))}
 
 
 def pendulum(length: float = 1.0, mass: float = 1.0, angle: float = 0.0) -> Scene:
-    """A point mass on a massless rod under gravity, released at rest; at 0 the rod is horizontal.
+    """Return a point mass on a massless rod under gravity, released at rest; at 0 the rod is horizontal.
 
     For 1 m, 1 kg from the horizontal the period is 2.367841947576 s (IFToMM library of benchmark problems, A01).
 
@@ -51,12 +51,12 @@ def pendulum(length: float = 1.0, mass: float = 1.0, angle: float = 0.0) -> Scen
 
 
 def double_pendulum(lengths: Any = (1.0, 1.0), masses: Any = (1.0, 1.0), angles: Any = (0.3, 0.5)) -> Scene:
-    """Two thin rods, one on the other's end, released at rest under gravity: chaotic where they swing far.
+    """Return two thin rods, one on the other's end, released at rest under gravity: chaotic for large swings.
 
     Parameters
     ----------
     lengths, masses : m, kg
-    angles : rad, of the upper rod from the horizontal, and of the lower one against it
+    angles : rad, of the upper rod from the horizontal, and of the lower rod relative to it
     """
     _positive(lengths=min(lengths), masses=min(masses))
     model = Multibody("double pendulum")
@@ -67,7 +67,7 @@ def double_pendulum(lengths: Any = (1.0, 1.0), masses: Any = (1.0, 1.0), angles:
 
 
 def heavy_top() -> Scene:
-    """A fast top whose tip is held, under gravity: 15 kg, 1 m from tip to centre of mass, spinning with 150 rad/s about it.
+    """Return a fast top with a fixed tip, under gravity: 15 kg, 1 m from tip to centre of mass, spinning with 150 rad/s about it.
 
     The benchmark of O. Brüls and A. Cardona, On the use of Lie group time integrators in multibody dynamics, J. Computational and Nonlinear
     Dynamics 5, 2010: energy 5435.69679 J; the centre of mass is at (0.1733439641, 0.6400885921, -0.7484907911) m after 1 s.
@@ -79,7 +79,7 @@ def heavy_top() -> Scene:
 
 
 def cart_pole(cart: float = 1.0, pole: float = 0.1, length: float = 1.0, angle: float = 0.1) -> Scene:
-    """A pole on a cart that runs on a rail: unstable upright. The hinge "rail" is what a controller drives.
+    """Return a pole on a cart that runs on a rail: unstable upright. A controller drives the hinge "rail".
 
     The equations of A. G. Barto, R. S. Sutton, C. W. Anderson, Neuronlike adaptive elements, IEEE Trans. Systems, Man, and Cybernetics 13,
     1983, without their friction.
@@ -87,8 +87,8 @@ def cart_pole(cart: float = 1.0, pole: float = 0.1, length: float = 1.0, angle: 
     Parameters
     ----------
     cart, pole : kg
-    length : m, of the pole, a thin rod
-    angle : rad, of the pole from upright
+    length : m, length of the pole, a thin rod
+    angle : rad, angle of the pole from upright
     """
     _positive(cart=cart, pole=pole, length=length)
     model = Multibody("cart-pole")
@@ -99,18 +99,18 @@ def cart_pole(cart: float = 1.0, pole: float = 0.1, length: float = 1.0, angle: 
 
 
 def kepler(semi_major_axis: float = 8.0e6, eccentricity: float = 0.2, mu: float = EARTH, mass: float = 1.0) -> Scene:
-    """A satellite about a point mass at the origin, at its pericentre: an ellipse, with the period 2π √(a³/μ).
+    """Return a satellite about a point mass at the origin, at its pericentre: an ellipse, with the period 2π √(a³/μ).
 
     Parameters
     ----------
     semi_major_axis : m
-    eccentricity : from 0 to below 1
-    mu : m³/s²; of the Earth by default
+    eccentricity : at least 0 and below 1
+    mu : m³/s²; default: the Earth's
     mass : kg
     """
     _positive(semi_major_axis=semi_major_axis, mu=mu, mass=mass)
     if not 0 <= eccentricity < 1:
-        raise _core.ModelError(f"eccentricity={eccentricity}: an ellipse's is from 0 to below 1")
+        raise _core.ModelError(f"eccentricity={eccentricity}: give at least 0 and less than 1, as for an ellipse")
     model = Multibody("satellite")
     model.add_body("satellite", hinge="free", mass=mass, inertia=mass * np.eye(3))
     speed = np.sqrt(mu / semi_major_axis * (1 + eccentricity) / (1 - eccentricity))
@@ -119,7 +119,7 @@ def kepler(semi_major_axis: float = 8.0e6, eccentricity: float = 0.2, mu: float 
 
 
 def furuta(arm: float = 0.0826, pendulum: float = 0.064, angle: float = 0.1) -> Scene:
-    """Furuta's pendulum: an arm that turns about the vertical, driven at "motor", with a pendulum on its end, unstable upright.
+    """Return Furuta's pendulum: an arm that turns about the vertical, driven at "motor", with a pendulum on its end, unstable upright.
 
     Thin rods of 0.1 kg and 0.05 kg, the size of a desktop device. Source: K. Furuta, M. Yamakita, S. Kobayashi, Swing-up control of
     inverted pendulum using pseudo-state feedback, J. Systems and Control Engineering 206, 1992.
@@ -127,7 +127,7 @@ def furuta(arm: float = 0.0826, pendulum: float = 0.064, angle: float = 0.1) -> 
     Parameters
     ----------
     arm, pendulum : m
-    angle : rad, of the pendulum from upright
+    angle : rad, angle of the pendulum from upright
     """
     _positive(arm=arm, pendulum=pendulum)
     model = Multibody("Furuta pendulum")
@@ -138,14 +138,14 @@ def furuta(arm: float = 0.0826, pendulum: float = 0.064, angle: float = 0.1) -> 
 
 
 def acrobot(angles: Any = (0.2, -0.1)) -> Scene:
-    """Two links hanging from a fixed "shoulder"; what drives them sits at the "elbow" alone.
+    """Return two links hanging from a fixed "shoulder", with a drive only at the "elbow".
 
-    Numbers of R. S. Sutton, Generalization in reinforcement learning, Advances in Neural Information Processing Systems 8, 1996: links of
-    1 m and 1 kg, centres of mass in the middle, inertias of 1 kg m² about them.
+    Parameters of R. S. Sutton, Generalization in reinforcement learning, Advances in Neural Information Processing Systems 8, 1996: links
+    of 1 m and 1 kg, centres of mass in the middle, inertias of 1 kg m² about them.
 
     Parameters
     ----------
-    angles : rad, of the first link from hanging down, and of the second against it
+    angles : rad, of the first link from hanging down, and of the second relative to it
     """
     model = Multibody("acrobot")
     link: dict[str, Any] = {"mass": 1.0, "com": (0, 0, -0.5), "inertia": np.eye(3)}
@@ -156,7 +156,7 @@ def acrobot(angles: Any = (0.2, -0.1)) -> Scene:
 
 
 def n_four_bar(N: int = 2, method: str = "augment") -> Scene:
-    """N four-bars side by side in a vertical plane: N + 1 cranks of 1 m on the ground, N rods between their tips, 1 kg each.
+    """Return N four-bars side by side in a vertical plane: N + 1 cranks of 1 m on the ground, N rods between their tips, 1 kg each.
 
     Cranks start upright, with 1 rad/s: for N = 2 the energy is 35.835 J. Within 10 s they pass the line with the ground, a singular state,
     ten times; then the first tip is at (0.3284581115, 0.9445185382) m for N = 2, at (0.180512227, 0.983572741) m for N = 40. Coordinate 0
@@ -165,7 +165,7 @@ def n_four_bar(N: int = 2, method: str = "augment") -> Scene:
     Parameters
     ----------
     N : 1 or more
-    method : of `effects.Loop`
+    method : method of `effects.Loop`
     """
     N = whole(N, "N")
     model = linkages.n_four_bar(N)
@@ -174,7 +174,7 @@ def n_four_bar(N: int = 2, method: str = "augment") -> Scene:
 
 
 def andrews(method: str = "augment") -> Scene:
-    """Andrews' squeezer: seven bodies within centimetres, driven by 0.033 N m, for 30 ms, in which the crank turns two and a half times.
+    """Return Andrews' squeezer: seven bodies of centimetre size, driven by 0.033 N m; in 30 ms the crank turns two and a half times.
 
     The angles at 0.03 s of the test set for initial value problems: β = 15.81077, Θ = -15.75637, γ = 0.0408224, δ = 0.524410,
     φ = -0.534730, ε = 1.048081, ω = 0.534730 rad, in the model's order. Source: as `pycraft.models.linkages.andrews`.
@@ -185,7 +185,7 @@ def andrews(method: str = "augment") -> Scene:
 
 
 def bricard(method: str = "augment") -> Scene:
-    """Bricard's linkage under gravity along -y: one degree of freedom, and one redundant row that is no particular one.
+    """Return Bricard's linkage under gravity along -y: one degree of freedom, and one redundant row, which may be any of its rows.
 
     Source: as `pycraft.models.linkages.bricard`.
     """
@@ -193,7 +193,7 @@ def bricard(method: str = "augment") -> Scene:
 
 
 def slider_crank(speed: float = 10.0, method: str = "augment") -> Scene:
-    """A crank of 0.15 m that turns freely, and the block of 0.5 kg that its rod pushes along x; no gravity.
+    """Return a crank of 0.15 m that turns freely, and a block of 0.5 kg that its rod pushes along x; no gravity.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def slider_crank(speed: float = 10.0, method: str = "augment") -> Scene:
 
 
 def peaucellier(speed: float = 1.0, method: str = "augment") -> Scene:
-    """Peaucellier's linkage, turning about its centre line: node "pen" stays on a straight line, to rounding. No gravity.
+    """Return Peaucellier's linkage, turning about its centre line: node "pen" stays on a straight line, to rounding. No gravity.
 
     Parameters
     ----------
@@ -217,17 +217,18 @@ def peaucellier(speed: float = 1.0, method: str = "augment") -> Scene:
 
 
 def five_bar(method: str = "augment") -> Scene:
-    """A planar parallel robot under gravity along -y, at rest at first, its two motors off."""
+    """Return a planar parallel robot under gravity along -y, initially at rest, with its two motors off."""
     return Scene(linkages.five_bar()).add(Gravity(ALONG_Y), Loop(method=method))
 
 
 def stewart(method: str = "augment") -> Scene:
-    """A hexapod under gravity along -z, at rest at first, its six legs free to slide."""
+    """Return a hexapod under gravity along -z, initially at rest, with its six legs free to slide."""
     return Scene(linkages.stewart()).add(Gravity(DOWN), Loop(method=method))
 
 
 def delta(method: str = "augment") -> Scene:
-    """A Delta robot under gravity along -z, at rest at first, its three motors off: its plate falls and swings without turning.
+    """Return a Delta robot under gravity along -z, initially at rest, with its three motors off: its plate falls and swings without
+    turning.
 
     Source: as `pycraft.models.linkages.delta`.
     """
@@ -235,15 +236,16 @@ def delta(method: str = "augment") -> Scene:
 
 
 def flyball_governor(rigid: bool = False, method: str = "augment") -> Scene:
-    """Watt's governor, its shaft turning freely with 2π rad/s at first, under gravity: balls fly out, the slider rises, and they swing.
+    """Return Watt's governor under gravity, its shaft turning freely, initially with 2π rad/s: balls fly out, the slider rises, and they
+    swing.
 
-    Its couplers are springs of 8e5 N/m and dampers of 4e4 N s/m, stiff: take integrator="rosenbrock4"; or rigid, as loops.
+    Its couplers are springs of 8e5 N/m and dampers of 4e4 N s/m, which are stiff: use integrator="rosenbrock4"; or rigid, as loops.
     Source: as `pycraft.models.linkages.flyball_governor`.
 
     Parameters
     ----------
-    rigid : whether the couplers have no give
-    method : of `effects.Loop`, of rigid couplers
+    rigid : True for rigid couplers
+    method : method of `effects.Loop` for rigid couplers
 
     Examples
     --------
@@ -263,15 +265,15 @@ def flyball_governor(rigid: bool = False, method: str = "augment") -> Scene:
 
 
 def bicycle(speed: float = 4.6, lean_rate: float = 0.0, method: str = "augment") -> Scene:
-    """The Whipple bicycle with its rider, benchmark parameters, rolling upright along x without a hand on it; wheels do not slip.
+    """Return the Whipple bicycle with its rider, benchmark parameters, rolling upright along x, uncontrolled; wheels do not slip.
 
-    Coordinate "frame[0]" is its lean, "steer" its steer, both positive to the right. By itself it keeps upright from 4.292 m/s (weave) to
+    Coordinate "frame[0]" is its lean, "steer" its steer, both positive to the right. It is self-stable from 4.292 m/s (weave) to
     6.024 m/s (capsize). Source: as `pycraft.models.vehicles.bicycle`.
 
     Parameters
     ----------
     speed : m/s
-    lean_rate : rad/s, at first
+    lean_rate : rad/s, initial lean rate
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""States of a scene over time, and what follows from them."""
+"""States of a scene over time, and quantities computed from them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class FrameMotion:
 
 
 class Motion:
-    """K states of a scene, and what follows from them. Of one time everything is without the axis K.
+    """K states of a scene, and quantities computed from them. At a single time the axis K is missing.
 
     Attributes
     ----------
@@ -37,7 +37,9 @@ class Motion:
 
     def __init__(self, about: Mapping[str, Any], rows: Mapping[str, np.ndarray], calls: Any = None, alone: bool = False):
         self._about, self._calls, self._alone = dict(about), calls, alone
-        self._parameters: int | None = self.model._parameters  # of the model as it was; None for one that was edited since
+        self._parameters: int | None = (
+            self.model._parameters
+        )  # count of the model's edits at the time of the run; None for a model edited since
         self.t, self.q, self.v, self.states = (rows[name] for name in ("t", "q", "v", "states"))
         self._work = rows["work"]
         if alone:
@@ -56,20 +58,20 @@ class Motion:
 
     @property
     def workers(self) -> list[str]:
-        """The effects whose works are counted, in the order of the columns of `energy["work"]`."""
+        """The effects with recorded works, in the order of the columns of `energy["work"]`."""
         return [self._about["effects"][i] for i in self._about["workers"]]
 
     @property
     def _edited(self) -> bool:
-        """Whether the model is no more what it was."""
+        """True if the model was edited since."""
         return self._parameters != self.model._parameters
 
     def _unedited_model(self) -> Any:
-        """The model, as long as it is what it was: numbers that were not computed yet would be another model's."""
+        """Return the model, if it was not edited: values that are not computed yet would belong to another model."""
         if self._edited:
             raise _core.StaleOperatorError(
-                f"{self.model.name!r} was edited since, and this motion is of the model as it was: t, q, v and states stay; simulate again "
-                "for the rest, or look at it before the edit"
+                f"{self.model.name!r} was edited since this motion was computed: t, q, v and states stay valid; simulate again "
+                "for other quantities, or read them before the edit"
             )
         return self.model
 
@@ -79,11 +81,11 @@ class Motion:
         return (np.atleast_1d(t), q[None], v[None], states[None]) if self._alone else (t, q, v, states)
 
     def _scene(self) -> Any:
-        """What computes."""
+        """Return the scene that computes."""
         if self._calls is None:
             raise _core.EvaluationError(
-                "this motion has no scene behind it: of a run that was pickled or read from a file, accelerations, forces and energies "
-                "are known at its own times alone"
+                "this motion has no scene: for a run that was pickled or read from a file, accelerations, forces and energies "
+                "are known only at its own times"
             )
         self._unedited_model()
         return self._calls
@@ -107,22 +109,22 @@ class Motion:
 
     @property
     def energy(self) -> dict[str, np.ndarray]:
-        """Energies in J: "kinetic" (K,), rotors included; "potential" (K,), of all effects that have one; "work" (K, n), of each effect of
-        `workers`, what it has done since the start besides. kinetic + potential - Σ work is constant, but for the integrator's error.
+        """Energies in J: "kinetic" (K,), rotors included; "potential" (K,), of all effects that have one; "work" (K, n), work of each
+        effect of `workers` since the start. kinetic + potential - Σ work is constant, except for the integrator's error.
         """
         if not self._about["energy"]:
-            raise _core.EvaluationError("this run kept no account of works; simulate with energy=True")
+            raise _core.EvaluationError("this run did not record works; simulate with energy=True")
         return {"kinetic": self._along["kinetic"], "potential": self._along["potential"].sum(axis=-1), "work": self._work}
 
     @property
     def balance(self) -> np.ndarray:
-        """(K,) kinetic + potential - Σ work, J: constant, but for the integrator's error."""
+        """(K,) kinetic + potential - Σ work, J: constant, except for the integrator's error."""
         energy = self.energy
         return energy["kinetic"] + energy["potential"] - energy["work"].sum(axis=-1)
 
     @property
     def drift(self) -> dict[str, np.ndarray]:
-        """(K,) by the loops of the model that have residuals: the largest, m and rad; whether effects keep the loop or not."""
+        """Largest residual (K,), m and rad, by loop of the model with residuals, even for loops that no effect keeps."""
         model = self._unedited_model()
         residual, of_positions = np.abs(model.loops.residual(self.q)), np.asarray(model.loops.of_positions, bool)
         own = {name: np.arange(len(of_positions))[loop.slice][of_positions[loop.slice]] for name, loop in model.loops.items()}
@@ -131,7 +133,7 @@ class Motion:
     @cached_property
     def momentum(self) -> dict[str, np.ndarray]:
         """Spatial momentum (K, 6) of all bodies in the world's axes, angular first, N m s and N s: "origin", about the world's origin,
-        and "com", about the centre of mass; of a model without mass zero about any point.
+        and "com", about the centre of mass; zero about any point for a model without mass.
         """
         about_origin = self._unedited_model().momentum(self.q, self.v).value
         about_com = about_origin.copy()
@@ -145,16 +147,16 @@ class Motion:
         return self._unedited_model().centre_of_mass(self.q)
 
     def interbody_forces(self, hinges: Any = None, *, axes: Any = "body", about: Any = None, part: str = "whole") -> np.ndarray:
-        """The spatial forces (moment; force) that parents put on their children through the hinges, under all effects: N m and N.
+        """Return the spatial forces (moment; force) of parents on their children through the hinges, under all effects: N m and N.
 
         Parameters
         ----------
         hinges : a name or `Hinge`, or a list of them; None: all, in the model's order
-        axes, about, part : as in `Multibody.interbody_forces`; frames that a function moves are where they are at the motion's times
+        axes, about, part : as in `Multibody.interbody_forces`; frames moved by a function are placed at the motion's times
 
         Returns
         -------
-        (K, N, 6); of one hinge (K, 6)
+        (K, N, 6); for one hinge (K, 6)
 
         Examples
         --------
@@ -167,11 +169,11 @@ class Motion:
         return f[0] if self._alone else f
 
     def frame(self, name: str, *, axes: str = "body") -> FrameMotion:
-        """A body or node over time: poses in the world and velocities, in its own axes or as `Multibody.jacobian` has them.
+        """Return a body or node over time: poses in the world and velocities, in its own axes or in the axes of `Multibody.jacobian`.
 
         Parameters
         ----------
-        name : of a body or node
+        name : name of a body or node
         axes : {"body", "aligned", "world"}
         """
         model = self._unedited_model()
@@ -183,12 +185,12 @@ class Motion:
 
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:
-        """What it is made of: numbers that follow are found first, as what computes them stays behind."""
+        """Pickle the data, after computing all derived values, because the scene that computes them is not pickled."""
         if self._calls is not None and not self._edited:
-            self._along  # noqa: B018 - is kept
+            self._along  # noqa: B018 - computes and caches
         return {**self.__dict__, "_calls": None, "_parameters": None if self._edited else 0}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        if self._parameters is not None:  # the model's count begins anew
+        if self._parameters is not None:  # the model's count restarts
             self._parameters = self.model._parameters

@@ -1,4 +1,4 @@
-"""Which effects matter at a tolerance, at states or along a run."""
+"""Effects that matter at a tolerance, at states or along a run."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .measuring import effects_on, having_on, measured_states
 
 
 class NeededTable(TidyTable):
-    """Rows of `Scene.needed`, what matters most first: one for each effect that is on.
+    """Rows of `Scene.needed`, one for each effect that is on, the most important first.
 
-    Each row is a dictionary: "effect", "error" (that leaving it out alone makes), "together" (that leaving it out makes together with all
-    that are not needed and matter less; None where it is needed by itself), "needed", "refused" (why the scene does not run without it,
-    else empty; it is needed then).
+    Each row is a dictionary: "effect", "error" (of leaving only this effect out), "together" (of leaving it out together with all effects
+    that are not needed and matter less; None if it is needed by itself), "needed", "refused" (why the scene does not run without it,
+    else empty; such an effect is needed).
     """
 
     columns = ("effect", "error", "together", "needed", "refused")
@@ -36,7 +36,7 @@ class NeededTable(TidyTable):
 
     @property
     def others(self) -> list[str]:
-        """Those that may be left out, all together."""
+        """The effects that may be left out, all together."""
         return [row["effect"] for row in self.rows if not row["needed"]]
 
     def cell(self, key: str, row: dict[str, Any]) -> str:
@@ -84,7 +84,7 @@ def needed(
 
 
 def _at_states(scene: Any, q: Any, v: Any) -> tuple[Callable[[list[str]], float], str]:
-    """Errors of the accelerations, ‖δv̇‖ / ‖v̇‖, the largest over the states, at t = 0."""
+    """Return errors of the accelerations, ‖δv̇‖ / ‖v̇‖, the largest over the states, at t = 0."""
     q, v = measured_states(scene, q, v)
     whole = [scene.evaluate(*state).vdot for state in zip(q, v, strict=True)]
 

@@ -1,4 +1,4 @@
-"""States that are off the loops which a scene keeps."""
+"""States off the loops that a scene keeps."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from .effects.effect import Effect
 from .effects.loops import Loop
 
 FAR, SLOW = 1e-6, 1e-3
-"""Residuals from here on, by the sizes of rows, are no state on the loops, as starts have it; so rates, by the largest velocity or SLOW."""
+"""Residual, relative to the size of a row, beyond which a state is off the loops, as for initial states; also of rates, relative to the
+largest velocity or SLOW."""
 
 
 def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: np.ndarray | None) -> None:
-    """A ModelWarning that names the row that a state misses most, by its residual or, at velocities v, by its rate, of loops that are kept.
+    """Warn (ModelWarning) of the row of kept loops that a state violates most, by its residual or, at velocities v, by its rate.
 
-    Of those that gains draw back (Baumgarte's) or springs hold none: a state off them is what they are for.
+    Loops with Baumgarte gains or springs cause no warning: they are meant for states off the loops.
 
-    Accelerations there keep what is missed as it is; what they say is of a mechanism that has come apart. Cost: the rows.
+    Accelerations at such a state keep the violation, so they belong to an open mechanism. Cost: evaluation of the rows.
     """
     keeping = [effect for effect in effects if isinstance(effect, Loop) and effect.keeps and not (effect.alpha or effect.beta)]
     if not keeping:
@@ -37,7 +38,7 @@ def warn_off_the_loops(model: Any, effects: Iterable[Effect], q: np.ndarray, v: 
         worst = rows[int(np.argmax(by_size))]
         if by_size.max() > FAR:
             warn(
-                f"the state {how} row {loops.rows[worst]!r} of {model.name!r} by {abs(off[worst]):.3g}: its accelerations keep that; "
-                "model.assemble(q, v) has a state on the loops"
+                f"the state {how} row {loops.rows[worst]!r} of {model.name!r} by {abs(off[worst]):.3g}: accelerations do not correct that; "
+                "model.assemble(q, v) returns a state on the loops"
             )
             return

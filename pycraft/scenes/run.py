@@ -1,4 +1,4 @@
-"""What a scene did over time."""
+"""The motion of a scene over time."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .motion import Motion
 
 
 class Run(Motion, Renamed):
-    """States of a scene over time, and what follows from them.
+    """States of a scene over time, and quantities computed from them.
 
     Attributes
     ----------
-    t : (K,) s, the times asked for, or the ends of all steps
+    t : (K,) s, the requested times, or the ends of all steps
     q, v : (K, nq), (K, nv)
     states : (K, n), the effects' own
-    events : by name, the states at which they happened (`EventStates`)
-    ended_by : the name of the event that ended the run, None where it reached its end
-    statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that solve by
-        derivatives), solutions (of variational ones: of the equations of a step), in_packs (accelerations that were found beside those of
-        other runs of a sweep), and how often each pass ran; "stiffness" where stability held the steps of an explicit method (t, step,
-        rate, effect, coordinate); of "auto" "switches", (t, the method that took steps from then on)
+    events : states at the events, by name (`EventStates`)
+    ended_by : name of the event that ended the run, None if it reached its end
+    statistics : evaluations of the accelerations, steps, rejected steps, seconds, linearizations (of integrators that use
+        derivatives), solutions (of the equations of a step, for variational integrators), in_packs (accelerations computed together with
+        other runs of a sweep), and the count of each pass; "stiffness" if stability limited the steps of an explicit method (t, step,
+        rate, effect, coordinate); for "auto" "switches", (t, the method used from then on)
 
-    What follows from the states is computed when it is first asked for, and kept. StaleOperatorError once the model was edited: the rest is
-    of the model as it was.
+    Quantities computed from the states are computed on first use and cached. After an edit of the model they raise StaleOperatorError,
+    because the states belong to the model before the edit.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class Run(Motion, Renamed):
     def of_record(
         cls, scene: Any, calls: _core.SceneCalls, record: _core.RunRecord, options: Any, events: list[Any], keep: slice | None
     ) -> Run:
-        """What the core wrote down of a run of a scene."""
+        """Return the run from the core's record."""
         names, integrator, precision = scene._names_on(), options.integrator.name, scene._how[3]
         steps = record.steps
         rows = steps if keep is None else {name: x[keep] for name, x in record.samples.items()}
@@ -92,10 +92,10 @@ class Run(Motion, Renamed):
     # ------------------------------------------------------------------ limits
     @cached_property
     def crossed_limits(self) -> list[CrossedLimit]:
-        """The coordinates that left limits of the model which no `Limits` effect of the scene held, in the model's order.
+        """Coordinates that left limits of the model not held by a `Limits` effect of the scene, in the model's order.
 
-        Each has `coordinate`, `limit`, `upper`, `first` (s) and `farthest`. Looked for at the ends of all steps, or at the rows where the
-        run kept no steps. Empty for a run that was read from a file without its scene. Cost: O(K N), once.
+        Each has `coordinate`, `limit`, `upper`, `first` (s) and `farthest`. Checked at the ends of all steps, or at the rows if the
+        run kept no steps. Saved in the files of runs. Cost: O(K N), once.
         """
         if "stops" not in self._about:
             return []
@@ -104,12 +104,12 @@ class Run(Motion, Renamed):
 
     # ------------------------------------------------------------------ between the rows
     def at(self, t: Any) -> Motion:
-        """The states at one time, or at several.
+        """Return the states at one time, or at several.
 
-        By the dense output of the integrator where it has one of its own ("dopri5", order 4; "dop853", 7; "rosenbrock4", 3), else by
+        Uses the dense output of the integrator if it has one ("dopri5", order 4; "dop853", 7; "rosenbrock4", 3), else
         Hermite's interpolation in q, v, v̇ on the group between the ends of steps: errors of a step of size h are O(h⁶) in q, O(h⁵) in v
-        and O(h⁴) in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file has the latter, with
-        the accelerations of each step at its ends, also at knots and samples, and straight lines for works and states.
+        and O(h⁴) in works and effects' own states (docs/simulation.md). A run that was pickled or read from a file uses
+        Hermite's interpolation, with the accelerations at both ends of each step, and linear interpolation for works and states.
 
         Parameters
         ----------
@@ -118,19 +118,19 @@ class Run(Motion, Renamed):
         Raises
         ------
         EvaluationError
-            A time outside of the run; a run that kept no steps (dense=False).
+            A time outside the run; a run that kept no steps (dense=False).
         """
         times = _core.real_array(t, "t")
         if times.ndim > 1:
-            raise _core.EvaluationError(f"t: a time or a list of times in seconds, not an array {times.shape}")
+            raise _core.EvaluationError(f"t must be a time or a list of times in seconds, not an array {times.shape}")
         rows = self._steps
         if rows is None:
-            raise _core.EvaluationError("this run kept the times of t_eval alone; simulate with dense=True to look between them")
+            raise _core.EvaluationError("this run kept only the times of t_eval; simulate with dense=True to interpolate between them")
         self._unedited_model()
         wanted, known = np.atleast_1d(times).astype(float), rows["t"]
         outside = wanted[~((wanted >= known[0]) & (wanted <= known[-1]))]
         if outside.size:
-            raise _core.EvaluationError(f"t = {outside[0]:g} s is not in the run, which goes from {known[0]:g} to {known[-1]:g} s")
+            raise _core.EvaluationError(f"t = {outside[0]:g} s is outside the run, which lasts from {known[0]:g} to {known[-1]:g} s")
         found = self._between(rows, wanted) if len(known) > 1 else {name: x[np.zeros(len(wanted), int)] for name, x in rows.items()}
         return Motion(self._about, found, self._calls, alone=times.ndim == 0)
 
@@ -148,7 +148,7 @@ class Run(Motion, Renamed):
         return {name: x[back] for name, x in found.items()}
 
     def _by_dense_output(self, rows: Mapping[str, np.ndarray], times: np.ndarray, steps: np.ndarray) -> dict[str, np.ndarray]:
-        """By that of the method which took each step, for times that rise."""
+        """Interpolate by the dense output of each step's method, at rising times."""
         integrator = self._about["integrator"] if ":" not in self._about["integrator"] else ""
         t, q, v, states, work = (rows[name] for name in ("t", "q", "v", "states", "work"))
         switches = self.statistics.get("switches", [])
@@ -182,22 +182,22 @@ class Run(Motion, Renamed):
         return _core.step_accelerations(self._calls, *(rows[name] for name in ("t", "q", "v", "states")))
 
     def checkpoint(self) -> Checkpoint:
-        """From where the run can go on: `scene.resume(run.checkpoint(), T)`."""
+        """Return a checkpoint to resume the run: `scene.resume(run.checkpoint(), T)`."""
         if self._checkpoint is None:
             raise _core.EvaluationError(
-                "a run that was read from a file has no checkpoint; save that of the run itself: run.checkpoint().save(path)"
+                "a run read from a file has no checkpoint; save the checkpoint of the original run: run.checkpoint().save(path)"
             )
         return self._checkpoint
 
     # ------------------------------------------------------------------ ways out
     def to_xarray(self) -> Any:
-        """The run as an xarray Dataset, with units. ImportError where xarray is missing (extra [data])."""
+        """Return the run as an xarray Dataset, with units. Raises ImportError if xarray is missing (extra [data])."""
         from .run_tables import to_xarray
 
         return to_xarray(self)
 
     def to_dataframe(self) -> Any:
-        """The run as a pandas DataFrame, a row a time. ImportError where pandas is missing (extra [data])."""
+        """Return the run as a pandas DataFrame, one row per time. Raises ImportError if pandas is missing (extra [data])."""
         from .run_tables import to_dataframe
 
         return to_dataframe(self)
@@ -207,7 +207,7 @@ class Run(Motion, Renamed):
 
         A file holds every state of the run: q, v, their derivatives, energies and forces. A stiff scene takes many steps: 2 s of Talos
         against its stops are 15,880 states, 25 MB of NetCDF and 57 MB of CSV. `simulate(T, t_eval=np.linspace(0, T, 200), dense=False)`
-        keeps 200 states and nothing between them.
+        keeps only 200 states.
 
         Raises
         ------
@@ -223,11 +223,11 @@ class Run(Motion, Renamed):
         save(self, path)
 
     def plot(self, *what: str, coordinates: Any = None) -> Any:
-        """Pictures over time, one above the other: returns Matplotlib's figure.
+        """Plot quantities over time, one panel above another; return Matplotlib's figure.
 
         Parameters
         ----------
-        what : of "q", "v", "vdot", "energy", "balance", "forces"; "q", "v", "energy" and "forces" where left out
+        what : some of "q", "v", "vdot", "energy", "balance", "forces"; default: "q", "v", "energy" and "forces"
         coordinates : names of coordinates or hinges, patterns, or a list of them; None: all
         """
         from .run_plots import plot
@@ -235,29 +235,29 @@ class Run(Motion, Renamed):
         return plot(self, what, coordinates)
 
     def animate(self, output: Any = None, *, fps: float = 25.0, speed: float = 1.0, trace: str | None = None, **options: Any) -> Any:
-        """The run as a moving stick figure, by Matplotlib alone: pictures, one a frame, for talks and papers. `to_html` writes numbers that
-        the browser draws: many times smaller, it can be turned and slowed down, and has plots.
+        """Animate the run as a stick figure, with only Matplotlib: one picture per frame, for talks and papers. `to_html` writes data that
+        the browser draws: many times smaller, can be turned and slowed down, and has plots.
 
         Parameters
         ----------
-        output : path that ends in ".html", ".gif" or ".mp4" (with ffmpeg), where it is written
-        fps : frames a second
-        speed : seconds of the run in a second of the film
-        trace : a body or node whose origin leaves its way behind
-        options : as `Multibody.plot` takes them: view, com, names, legend, shadow, ax
+        output : path of the file, ending in ".html", ".gif" or ".mp4" (with ffmpeg)
+        fps : frames per second
+        speed : seconds of the run per second of the film
+        trace : a body or node whose origin leaves a trace
+        options : as for `Multibody.plot`: view, com, names, legend, shadow, ax
 
         Returns
         -------
         RunAnimation
-            A notebook shows it with buttons to play it; `save` writes it, too. A run that kept no steps (dense=False) shows the last
-            state that was asked for before each frame.
+            A notebook shows it with buttons to play it; `save` writes it. A run that kept no steps (dense=False) shows the last
+            requested state before each frame.
 
         Raises
         ------
         EvaluationError
             Too many frames, another ending, a view that does not fit.
         ModelError
-            A trace of what is not there.
+            An unknown body or node to trace.
         OSError
             An output that cannot be written, before a frame is drawn.
 
@@ -278,32 +278,32 @@ class Run(Motion, Renamed):
     def to_html(
         self, output: Any = None, *what: str, fps: float = 30.0, speed: float = 1.0, trace: str | None = None, coordinates: Any = None
     ) -> Any:
-        """The run as one page of HTML that plays by itself, without a network: a figure that can be turned, a slider of time, and plots.
+        """Return the run as one self-contained page of HTML: a figure that can be turned, a time slider, and plots. It needs no network.
 
-        The browser draws it from the bodies' poses in single precision: 64 bytes a body and frame, and some 45 kB besides. The page's own
-        policy forbids it to send requests. `animate` makes pictures, films and GIFs instead.
+        The browser draws it from the bodies' poses in single precision: 64 bytes per body and frame, plus about 45 kB. The page's own
+        policy forbids requests. `animate` makes pictures, films and GIFs instead.
 
         Parameters
         ----------
-        output : path that ends in ".html", where it is written
-        what : plots, as `plot` takes them; "energy" where left out, "q" of a run that kept no account of works
-        fps : frames a second of the film
-        speed : seconds of the run in a second of the film, at first; the page has a choice of speeds
-        trace : a body or node whose origin leaves its way behind
-        coordinates : of the plots, as `plot` takes them
+        output : path of the file, ending in ".html"
+        what : plots, as for `plot`; default: "energy", or "q" for a run without recorded works
+        fps : frames per second of the film
+        speed : initial speed, seconds of the run per second of the film; the page offers other speeds
+        trace : a body or node whose origin leaves a trace
+        coordinates : coordinates of the plots, as for `plot`
 
         Returns
         -------
         RunPage
-            A notebook shows it; `html` is the page, `save` writes it. A run that kept no steps (dense=False) shows the last state that was
-            asked for before each frame.
+            A notebook shows it; `html` is the page, `save` writes it. A run that kept no steps (dense=False) shows the last requested
+            state before each frame.
 
         Raises
         ------
         EvaluationError
-            More than 100 MB of poses, another ending, plots that there are none of.
+            More than 100 MB of poses, another ending, unknown plots.
         ModelError
-            A trace of what is not there.
+            An unknown body or node to trace.
         OSError
             An output that cannot be written.
 
@@ -323,22 +323,22 @@ class Run(Motion, Renamed):
         return page
 
     def to_gltf(self, output: Any, *, fps: float = 30.0, speed: float = 1.0) -> Path:
-        """Write the run as animated glTF 2.0, which Blender, three.js, Babylon.js, Windows, macOS and most engines open.
+        """Write the run as animated glTF 2.0, for Blender, three.js, Babylon.js, Windows, macOS and most engines.
 
         A node for each body, with the triangles of its shapes in full and keyframes of its pose in the world; bodies without shapes
         are sticks and balls. Poses are in single precision; players interpolate between frames, rotations on the sphere. The world's
-        upright axis, which gravity is nearest to, becomes glTF's y. Written by pygltflib (extra [gltf]).
+        upright axis, the axis nearest to gravity, becomes glTF's y. Written by pygltflib (extra [gltf]).
 
         Parameters
         ----------
-        output : path that ends in ".glb" (one binary file) or ".gltf" (text, its numbers inside)
-        fps : keyframes a second of the film
-        speed : seconds of the run in a second of the film
+        output : path that ends in ".glb" (one binary file) or ".gltf" (text, with embedded data)
+        fps : keyframes per second of the film
+        speed : seconds of the run per second of the film
 
         Returns
         -------
         Path
-            The file. 28 bytes a body and frame, and 72 a triangle.
+            The file. 28 bytes per body and frame, and 72 per triangle.
 
         Raises
         ------
@@ -359,15 +359,16 @@ class Run(Motion, Renamed):
         return to_gltf(self, output, fps, speed)
 
     def to_usd(self, output: Any, *, fps: float = 30.0, speed: float = 1.0) -> Path:
-        """Write the run as USD, which Omniverse, Blender, Houdini, Maya and usdview open.
+        """Write the run as USD, for Omniverse, Blender, Houdini, Maya and usdview.
 
         A transform for each body, with time samples of its pose in the world in double precision, and meshes of its shapes below it; bodies
-        without shapes are sticks and balls. Metres; upright is the axis that gravity is nearest to. Written by usd-core (extra [usd]).
+        without shapes are sticks and balls. Lengths are in metres; the upright axis is the one nearest to gravity. Written by usd-core
+        (extra [usd]).
 
         Parameters
         ----------
         output : path that ends in ".usda" (text), ".usdc" (binary) or ".usd"
-        fps, speed : as `to_gltf` takes them
+        fps, speed : as for `to_gltf`
 
         Returns
         -------
@@ -392,22 +393,22 @@ class Run(Motion, Renamed):
         return to_usd(self, output, fps, speed)
 
     def lost_digits(self, states: int = 8, **options: Any) -> Any:
-        """Where the forward dynamics of the run's states loses digits, as colour on the robot over time, with the next rung and its price.
+        """Show where the forward dynamics along the run loses digits, as colour on the robot over time, with the next rung and its cost.
 
-        The tree's forward dynamics, by the generalized forces that give the run's accelerations, certified at some states: error, digits
-        gone in each D(k), and the first step up that at least halves the error, with its error and its time (`Multibody.certify`).
+        The tree's forward dynamics, with the generalized forces of the run's accelerations, is certified at some states: error, digits
+        lost in each D(k), and the next rung that at least halves the error, with its error and its time (`Multibody.certify`).
 
         Parameters
         ----------
-        states : how many of the run's, 1 to 200, evenly among its rows, the first and the last with them
-        options : of `Multibody.certify`: form, refine, residual, precision (the run's where left out), seed, seconds
+        states : number of states, 1 to 200, evenly spaced among the run's rows, including the first and the last
+        options : options of `Multibody.certify`: form, refine, residual, precision (default: the run's), seed, seconds
 
         Returns
         -------
         LostDigits
-            A notebook shows it; `save("digits.html")` writes a page that needs no network; `t`, `hinges`, `digits`, `certificates`.
+            A notebook shows it; `save("digits.html")` writes an offline page; `t`, `hinges`, `digits`, `certificates`.
 
-        Raises what `certify` raises, and EvaluationError for another number of states. Cost: a certificate each.
+        Raises the errors of `certify`, and EvaluationError for another number of states. Cost: one certificate per state.
 
         Examples
         --------
@@ -424,7 +425,7 @@ class Run(Motion, Renamed):
     # ------------------------------------------------------------------ copies
     def __getstate__(self) -> dict[str, Any]:
         if self._calls is not None and self._steps is not None and not self._edited:
-            self._vdot_of_steps  # noqa: B018 - is kept
+            self._vdot_of_steps  # noqa: B018 - computes and caches
         return super().__getstate__()
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Runs as moving stick figures, by Matplotlib alone: shown in a notebook, written as a web page, a GIF or a film."""
+"""Runs as moving stick figures, with only Matplotlib: shown in a notebook, or written as a web page, a GIF or a film."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ..view import StickFigure
 
 ENDINGS = (".html", ".gif", ".mp4")
 MOST = 2000
-"""Frames: at some tenth of a second each, three minutes of drawing."""
+"""Largest number of frames: at a tenth of a second each, three minutes of drawing."""
 LARGEST = 200.0
-"""MB of frames in one page."""
+"""Largest size of the frames in one page, MB."""
 
 
 class RunAnimation:
@@ -25,8 +25,8 @@ class RunAnimation:
 
     Attributes
     ----------
-    times : (n,) s, of the frames
-    figure : Matplotlib's
+    times : (n,) s, times of the frames
+    figure : Matplotlib's figure
     """
 
     def __init__(self, run: Any, fps: Any, speed: Any, trace: Any, options: dict[str, Any]):
@@ -48,7 +48,7 @@ class RunAnimation:
             self._way = self._stick.canvas.lines(colors="#0072b2", lw=1.0, zorder=2, alpha=0.7)
         self._show(0)
         if options.get("ax") is None:
-            pyplot.close(self.figure)  # or notebooks would show its first frame beside the film
+            pyplot.close(self.figure)  # otherwise notebooks would also show its first frame
 
     def _show(self, frame: int) -> list[Any]:
         moved = list(self._stick.update(self._q[frame]))
@@ -61,13 +61,13 @@ class RunAnimation:
 
     @cached_property
     def animation(self) -> Any:
-        """Matplotlib's `FuncAnimation`, for its other ways out."""
+        """Matplotlib's `FuncAnimation`, for its other output formats."""
         from matplotlib.animation import FuncAnimation
 
         return FuncAnimation(self.figure, self._show, frames=len(self.times), interval=1000 / self.fps, blit=False, repeat=True)
 
     def save(self, path: str | Path) -> Path:
-        """Write it, by the path's ending: ".html", a page that plays by itself in any browser; ".gif"; ".mp4" where ffmpeg is installed.
+        """Write the animation, by the path's ending: ".html", a page that plays in any browser; ".gif"; ".mp4" if ffmpeg is installed.
 
         Raises
         ------
@@ -84,7 +84,7 @@ class RunAnimation:
         else:
             from matplotlib.animation import FFMpegWriter, PillowWriter
 
-            fps: Any = self.fps  # fractions are taken, though its types know whole ones alone
+            fps: Any = self.fps  # fractions work, though its types allow only whole numbers
             self.animation.save(str(target), writer=(PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps))
         return target
 
@@ -104,7 +104,7 @@ class RunAnimation:
 
 
 def checked_film(path: Any) -> Path:
-    """A path that a film can be written to, before a frame is drawn."""
+    """Check, before a frame is drawn, that a film can be written to a path."""
     target = writable_target(path, ENDINGS, "a film")
     if target.suffix == ".mp4":
         from matplotlib.animation import FFMpegWriter
@@ -117,28 +117,28 @@ def checked_film(path: Any) -> Path:
 
 
 def positive(given: Any, name: str) -> float:
-    """A positive number. EvaluationError for any other."""
+    """Return a positive number. Raises EvaluationError for any other."""
     value = one_number(given, name)
     if not 0 < value < np.inf:
-        raise _core.EvaluationError(f"{name}={value:g}: a positive number")
+        raise _core.EvaluationError(f"{name}={value:g}: give a positive number")
     return value
 
 
 def _frames(run: Any, fps: float, speed: float) -> np.ndarray:
-    """Times of frames: from the run's first to its last."""
+    """Return times of frames, from the run's first to its last."""
     first, last = float(run.t[0]), float(run.t[-1])
     count = int(np.floor((last - first) * fps / speed * (1 + 1e-12))) + 1
     if count > MOST:
         raise _core.EvaluationError(
-            f"{last - first:g} s at fps={fps:g} and speed={speed:g} are {count} frames, and {MOST} at most are drawn; "
-            f"speed={speed * count / MOST:.2g} or more shows the same in less"
+            f"{last - first:g} s at fps={fps:g} and speed={speed:g} are {count} frames; at most {MOST} can be drawn; "
+            f"use speed={speed * count / MOST:.2g} or more"
         )
     times = first + np.arange(count) * (speed / fps)
     return np.minimum(times, last)
 
 
 def configurations(run: Any, times: np.ndarray) -> np.ndarray:
-    """q (n, nq) at the times; of a run that kept no steps those of the last time that was asked for before each."""
+    """Return q (n, nq) at the times; for a run that kept no steps, at the last requested time before each."""
     if run._steps is not None:
         return run.at(times).q
     return run.q[np.searchsorted(run.t, times, side="right") - 1]

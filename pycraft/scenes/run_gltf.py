@@ -1,4 +1,4 @@
-"""Runs as animated glTF 2.0: a node a body with its triangles, moved by keyframes. [The Khronos Group, glTF 2.0 Specification]"""
+"""Runs as animated glTF 2.0: one node per body with its triangles, moved by keyframes. [The Khronos Group, glTF 2.0 Specification]"""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .animated_bodies import AnimatedBodies, Solid, linear_colour
 
 ENDINGS = (".glb", ".gltf")
 _TO_Y_UP = {0: (0.0, 0.0, 0.5**0.5, 0.5**0.5), 1: (0.0, 0.0, 0.0, 1.0), 2: (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)}
-"""x, y, z, w of the turn from the world's upright axis to y, which is upright in glTF."""
+"""Rotation x, y, z, w from the world's upright axis to y, which is upright in glTF."""
 
 
 def checked_gltf(path: Any) -> Path:
-    """A path that glTF can be written to; the same errors as `to_gltf`, before a run and not after it."""
+    """Check, before a run, that glTF can be written to a path, with the errors of `to_gltf`."""
     target = writable_target(path, ENDINGS, "glTF")
     _pygltflib()
     return target
@@ -62,12 +62,12 @@ class _Document:
         self.made.set_binary_blob(bytes(self._bytes))
 
     def _mesh(self, name: str, solids: list[Solid]) -> int | None:
-        """One mesh of a body, a primitive a solid."""
+        """Add one mesh of a body, with a primitive per solid."""
         if not solids:
             return None
         g, primitives = self._g, []
         for solid in solids:
-            corners = solid.vertices[solid.faces].reshape(-1, 3)  # triangles have vertices of their own: flat shading, by exact normals
+            corners = solid.vertices[solid.faces].reshape(-1, 3)  # triangles do not share vertices: flat shading, with exact normals
             normals = np.repeat(_normals(solid), 3, axis=0)
             position = self._accessor(corners, g.VEC3, g.ARRAY_BUFFER, ends=True)
             attributes = g.Attributes(POSITION=position, NORMAL=self._accessor(normals, g.VEC3, g.ARRAY_BUFFER))
@@ -96,11 +96,11 @@ class _Document:
         return animation
 
     def _accessor(self, values: np.ndarray, kind: str, target: int | None, ends: bool = False) -> int:
-        """Numbers in single precision, with the least and the largest where the specification wants them."""
+        """Add values in single precision, with the least and the largest if the specification requires them."""
         x = np.ascontiguousarray(values, "<f4")
         data = x.tobytes()
         self.made.bufferViews.append(self._g.BufferView(buffer=0, byteOffset=len(self._bytes), byteLength=len(data), target=target))
-        self._bytes += data  # of single precision all are at multiples of four
+        self._bytes += data  # in single precision all offsets are multiples of four
         rows = x.reshape(len(x), -1)
         least = {"min": _plain(rows.min(axis=0)), "max": _plain(rows.max(axis=0))} if ends else {}
         self.made.accessors.append(
@@ -110,7 +110,7 @@ class _Document:
 
 
 def _normals(solid: Solid) -> np.ndarray:
-    """(m, 3) of the faces, unit vectors; z of triangles without an area."""
+    """Return unit normals (m, 3) of the faces; z for triangles without area."""
     a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     sizes = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -126,6 +126,6 @@ def _pygltflib() -> Any:
         import pygltflib
     except ImportError:
         raise _core.EvaluationError(
-            "glTF is written by the package pygltflib, which is not installed: pip install 'pycraft-soa[gltf]'"
+            "glTF output needs the package pygltflib, which is not installed: pip install 'pycraft-soa[gltf]'"
         ) from None
     return pygltflib

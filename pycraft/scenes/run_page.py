@@ -1,4 +1,4 @@
-"""Runs as pages that play by themselves: the figure drawn in the browser from the bodies' poses, a slider of time, and plots."""
+"""Runs as self-contained pages: the figure drawn in the browser from the bodies' poses, a time slider, and plots."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from .run_animation import configurations, positive
 from .run_plots import chosen_panels, event_marks
 
 LARGEST = 100.0
-"""MB of poses in one page."""
+"""Largest size of the poses in one page, MB."""
 POINTS = 1000
-"""Of a line of a plot: of more of the run's own times, so many are shown, evenly by their number."""
+"""Largest number of points of a line in a plot; of more times, every nth is shown."""
 FAR = 3.0
-"""A loose model whose way is this many times its size is followed by the camera at first."""
+"""The camera initially follows a free model that moves farther than this many times its size."""
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 5, 10)
 
 
@@ -34,7 +34,7 @@ class RunPage(Page):
 
     Attributes
     ----------
-    times : (n,) s, of the frames
+    times : (n,) s, times of the frames
     html : str, the page
     """
 
@@ -75,11 +75,11 @@ class RunPage(Page):
         return web_page("film", run.model.name, data, texts)
 
     def _follow(self, figure: dict[str, Any]) -> str:
-        """What the camera follows at first: a model that is loose and goes far beyond its own size; else nothing."""
+        """Return the initial target of the camera: a free model that moves far beyond its own size; else nothing."""
         return "robot" if self._skeleton.is_loose() and max(figure["half"]) > FAR * max(figure["near"]) else ""
 
     def _beyond(self) -> list[dict[str, Any]]:
-        """Of each coordinate beyond a limit that no effect holds: its body, and the first and last frame of each time that it is."""
+        """Return for each coordinate beyond a limit that no effect holds: its body, and the first and last frame of each violation."""
         model, found = self._run.model, []
         owners = {j: k for k, hinge in enumerate(model.hinges.values()) for j in range(hinge.v_slice.start, hinge.v_slice.stop)}
         q_index = coordinate_limits(model).q_index
@@ -96,7 +96,7 @@ class RunPage(Page):
         return [] if self._run._edited else self._run.crossed_limits
 
     def _crossed(self) -> str:
-        """The coordinates beyond their limits, for the heading; "" where there are none."""
+        """Return the coordinates beyond their limits, for the heading; "" if there are none."""
         crossed = self._crossed_limits()
         if not crossed:
             return ""
@@ -104,7 +104,7 @@ class RunPage(Page):
         return f'<span class="crossed" title="{escape(every)}">beyond limits: {escape(crossed_names(crossed))}</span>'
 
     def save(self, path: str | Path) -> Path:
-        """Write it to a path that ends in ".html". EvaluationError for another ending, OSError where it cannot be written."""
+        """Write the page to a path that ends in ".html". Raises EvaluationError for another ending, OSError if it cannot be written."""
         target = checked_page(path)
         target.write_text(self.html, encoding="utf-8")
         return target
@@ -115,19 +115,19 @@ class RunPage(Page):
 
 
 def checked_page(path: Any) -> Path:
-    """A path that a page can be written to."""
+    """Check that a page can be written to a path."""
     return writable_target(path, (".html",), "a page")
 
 
 def frame_times(run: Any, rate: float) -> np.ndarray:
-    """Times of frames, `rate` a second of the run: from its first to its last, which is one."""
+    """Return times of frames, `rate` per second of the run, from its first to its last time, both included."""
     first, last = float(run.t[0]), float(run.t[-1])
     count = (last - first) * rate
     size = count * max(run.model._size, 1) * 64 / 1e6
     if size > LARGEST:
         raise _core.EvaluationError(
-            f"{last - first:g} s in {count:.3g} frames of {run.model._size} bodies are {size:.3g} MB of poses, and {LARGEST:g} at most go "
-            f"into a page; a lower fps, or speed={size / LARGEST:.2g} times what it is, shows the same in less"
+            f"{last - first:g} s in {count:.3g} frames of {run.model._size} bodies are {size:.3g} MB of poses; a page holds at most "
+            f"{LARGEST:g} MB: use a lower fps, or speed={size / LARGEST:.2g} times the present one"
         )
     whole = int(np.floor(count * (1 + 1e-12)))
     times = first + np.arange(whole + 1) / rate
@@ -135,5 +135,5 @@ def frame_times(run: Any, rate: float) -> np.ndarray:
 
 
 def _offered(run: Any, what: tuple[str, ...]) -> list[Any]:
-    """What is shown where nothing was asked for; nothing of a model without coordinates."""
+    """Return the default plots; none for a model without coordinates."""
     return chosen_panels(run, what, None) if run.model.nv else []

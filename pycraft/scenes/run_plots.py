@@ -1,4 +1,4 @@
-"""Pictures of runs: coordinates with names and units, energies and their balance, forces of effects."""
+"""Plots of runs: coordinates with names and units, energies and their balance, forces of effects."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .effects.effect import names_of
 WHAT = ("q", "v", "vdot", "energy", "balance", "forces")
 COLOURS = ("#1f4e79", "#c55a11", "#4d7c2a", "#6b3fa0", "#8a8a8a", "#a8324a", "#2a9d8f", "#b8860b")
 MARKS = 60
-"""Vertical lines at events."""
+"""Largest number of vertical lines at events."""
 NAMED = 8
-"""Lines of a panel that have names: of more, the first ones."""
+"""Largest number of named lines in a panel; further lines have no names."""
 
 
 @dataclass
 class Panel:
-    """One picture: lines by name over time, and what is on its axis."""
+    """One panel: lines by name over time, and the label of its axis."""
 
     title: str
     axis: str
@@ -29,21 +29,21 @@ class Panel:
 
 
 def plot(run: Any, what: tuple[str, ...], coordinates: Any) -> Any:
-    """The figure of `Run.plot`."""
+    """Return the figure of `Run.plot`."""
     if not what:
         what = ("q", "v", *(("energy",) if run._about["energy"] else ()), "forces")
     return _figure(run, chosen_panels(run, what, coordinates))
 
 
 def chosen_panels(run: Any, what: tuple[str, ...], coordinates: Any) -> list[Panel]:
-    """Pictures of a run, as `Run.plot` takes them. EvaluationError for what is no picture, and where there is nothing to see."""
+    """Return panels of a run, as for `Run.plot`. Raises EvaluationError for unknown plots, and if there is nothing to plot."""
     unknown = [name for name in what if name not in WHAT]
     if unknown:
-        raise _core.EvaluationError(f"plot: no picture is called {unknown[0]!r}; there are {', '.join(map(repr, WHAT))}")
+        raise _core.EvaluationError(f"plot: no plot is called {unknown[0]!r}; there are {', '.join(map(repr, WHAT))}")
     chosen = _core.coordinates_named(run._unedited_model(), names_of(coordinates, "plot"), "plot")
     panels = [panel for name in what for panel in _panels(run, name, chosen) if panel.lines]
     if not panels:
-        raise _core.EvaluationError(f"plot: there is nothing to see of {', '.join(map(repr, what))} in this run")
+        raise _core.EvaluationError(f"plot: this run has no data for {', '.join(map(repr, what))}")
     return panels
 
 
@@ -63,7 +63,7 @@ def _panels(run: Any, name: str, chosen: list[int]) -> list[Panel]:
         return [panel for effect, forces in run.forces.items() for panel in _of_effect(effect, forces, chosen, coordinate_names, v_units)]
     energy = run.energy
     if name == "balance":
-        return [Panel("kinetic + potential - work, less its first value", "J", {"balance": run.balance - run.balance[0]})]
+        return [Panel("kinetic + potential - work, minus its first value", "J", {"balance": run.balance - run.balance[0]})]
     works = {f"work of {worker}": energy["work"][:, i] for i, worker in enumerate(run.workers)}
     return [
         Panel(
@@ -75,7 +75,7 @@ def _panels(run: Any, name: str, chosen: list[int]) -> list[Panel]:
 
 
 def _of_effect(effect: str, forces: np.ndarray, chosen: list[int], names: list[str], units: list[str]) -> list[Panel]:
-    """Of coordinates that the effect acts on."""
+    """Return panels of the coordinates on which the effect acts."""
     of_units = {unit: (f"forces of {effect}", POWER[unit]) for unit in ("rad", "m")}
     return _by_unit([(names[j], units[j], forces[:, j]) for j in chosen if forces[:, j].any()], of_units)
 
@@ -88,7 +88,7 @@ def _by_unit(rows: list[tuple[str, str, np.ndarray]], of_units: dict[str, tuple[
 
 
 def _in_q(model: Any, coordinate: int) -> list[int]:
-    """The numbers of q of the hinge that a coordinate belongs to; of one with as many in q as in v its own."""
+    """Return the entries of q of a coordinate's hinge; only its own entry if the hinge has as many in q as in v."""
     for hinge in model.hinges.values():
         if hinge.v_slice.start <= coordinate < hinge.v_slice.stop:
             q, v = range(hinge.q_slice.start, hinge.q_slice.stop), range(hinge.v_slice.start, hinge.v_slice.stop)
@@ -121,9 +121,9 @@ def _figure(run: Any, panels: list[Panel]) -> Any:
 
 
 def event_marks(run: Any) -> tuple[list[float], str]:
-    """Times of the lines that mark events, s, and what to say where there are more events than lines.
+    """Return times of the lines that mark events, s, and a note if there are more events than lines.
 
-    More than MARKS lines would paint a plot black: then it is those MARKS events that lie nearest to times at even distances.
+    More than MARKS lines would fill a plot: then only the MARKS events nearest to evenly spaced times are marked.
     """
     times = np.sort([float(t) for event in run.events.values() for t in event.t])
     if len(times) <= MARKS:

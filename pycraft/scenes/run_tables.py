@@ -1,4 +1,4 @@
-"""Runs as tables and data sets: names, units, and the packages that hold them."""
+"""Runs as tables and data sets: names, units, and conversion to other packages."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ HOLDS = "pip install 'pycraft-soa[data]'"
 
 
 def columns_of(run: Any) -> dict[str, np.ndarray]:
-    """Everything of a run by column, (K,) each: "t", "q.shoulder", "v.shoulder", "vdot.shoulder", "force.gravity.shoulder", "state.0", and
-    of runs that kept account of works "kinetic", "potential.gravity" and "work.damping"."""
+    """Return all data of a run by column, (K,) each: "t", "q.shoulder", "v.shoulder", "vdot.shoulder", "force.gravity.shoulder", "state.0",
+    and for runs that recorded works "kinetic", "potential.gravity" and "work.damping"."""
     (of_q, _, _), of_v = coordinate_units(run._unedited_model()), run.model.coordinate_names
 
     def by_name(start: str, names: Any, x: np.ndarray) -> dict[str, np.ndarray]:
@@ -29,17 +29,17 @@ def columns_of(run: Any) -> dict[str, np.ndarray]:
 
 
 def to_dataframe(run: Any) -> Any:
-    """A pandas DataFrame with the columns of `columns_of`, by time."""
+    """Return a pandas DataFrame with the columns of `columns_of`, by time."""
     try:
         import pandas
     except ImportError:
-        raise ImportError(f"to_dataframe() needs pandas: {HOLDS}; save('run.csv') needs nothing") from None
+        raise ImportError(f"to_dataframe() needs pandas: {HOLDS}; save('run.csv') needs no package") from None
     columns = columns_of(run)
     return pandas.DataFrame(columns, index=pandas.Index(columns.pop("t"), name="t"))
 
 
 def variables_of(run: Any) -> dict[str, tuple[tuple[str, ...], np.ndarray, str]]:
-    """Arrays of a run by name, each with the names of its axes and its unit."""
+    """Return arrays of a run by name, each with the names of its axes and its unit."""
     energies = ("kinetic", "potential")
     units = {"q": "rad, m or 1", "v": "rad/s or m/s", "vdot": "rad/s^2 or m/s^2", "forces": "N m or N"} | dict.fromkeys(energies, "J")
     axes = {
@@ -51,11 +51,11 @@ def variables_of(run: Any) -> dict[str, tuple[tuple[str, ...], np.ndarray, str]]
 
 
 def to_xarray(run: Any) -> Any:
-    """An xarray Dataset: the variables of `variables_of` over named coordinates, with momentum."""
+    """Return an xarray Dataset: the variables of `variables_of` over named coordinates, with momentum."""
     try:
         import xarray
     except ImportError:
-        raise ImportError(f"to_xarray() needs xarray: {HOLDS}; save('run.nc') and save('run.csv') need nothing") from None
+        raise ImportError(f"to_xarray() needs xarray: {HOLDS}; save('run.nc') and save('run.csv') need no package") from None
     names, q_units, v_units = coordinate_units(run._unedited_model())
     data: dict[str, Any] = {name: (axes, x, {"units": unit} if unit else {}) for name, (axes, x, unit) in variables_of(run).items()}
     momentum = (("about", "time", "component"), np.stack(list(run.momentum.values())), {"units": "N m s, N s"})

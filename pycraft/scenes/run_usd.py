@@ -1,4 +1,4 @@
-"""Runs as USD: a transform a body with time samples, and its triangles below. [OpenUSD, UsdGeom]"""
+"""Runs as USD: one transform per body with time samples, and its triangles below. [OpenUSD, UsdGeom]"""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ENDINGS = (".usda", ".usdc", ".usd")
 
 
 def checked_usd(path: Any) -> Path:
-    """A path that USD can be written to; the same errors as `to_usd`, before a run and not after it."""
+    """Check, before a run, that USD can be written to a path, with the errors of `to_usd`."""
     target = writable_target(path, ENDINGS, "USD")
     _usd()
     return target
@@ -37,7 +37,7 @@ def to_usd(run: Any, output: Any, fps: Any, speed: Any) -> Path:
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y if seen.up == 1 else UsdGeom.Tokens.z)
     names = _identifiers([seen.model.name or "model", *seen.names, "base"])
     root = UsdGeom.Xform.Define(stage, f"/{names[0]}")
-    if seen.up == 0:  # USD has y or z upright
+    if seen.up == 0:  # in USD, y or z is upright
         root.AddRotateYOp().Set(-90.0)
     stage.SetDefaultPrim(root.GetPrim())
     for k, name in [*enumerate(seen.names), (-1, "base")]:
@@ -51,12 +51,12 @@ def to_usd(run: Any, output: Any, fps: Any, speed: Any) -> Path:
         for i, solid in enumerate(solids):
             _mesh(UsdGeom.Mesh.Define(stage, f"{body.GetPath()}/shape{i}"), solid, Gf, Vt)
     if not stage.GetRootLayer().Export(str(target)):
-        raise OSError(f"output {str(output)!r} was not written by usd-core")
+        raise OSError(f"output {str(output)!r}: usd-core failed to write it")
     return target
 
 
 def _move(operation: Any, seen: AnimatedBodies, k: int, rate: float, Gf: Any) -> None:
-    """The pose of a body over time; USD multiplies rows from the left: its matrix is the transpose."""
+    """Set the pose of a body over time; USD multiplies row vectors, so its matrix is the transpose."""
     X = np.broadcast_to(np.eye(4), (len(seen.times), 4, 4)).copy()
     X[:, :3, :3], X[:, :3, 3] = seen.rotations[:, k], seen.positions[:, k]
     for t, pose in zip(seen.times, X, strict=True):
@@ -75,7 +75,7 @@ def _mesh(mesh: Any, solid: Solid, Gf: Any, Vt: Any) -> None:
 
 
 def _identifiers(names: list[str]) -> list[str]:
-    """Names as USD takes them, letters, digits and underscores, each once."""
+    """Return unique names for USD, of letters, digits and underscores."""
     found: list[str] = []
     for name in names:
         made = re.sub(r"\W", "_", name, flags=re.ASCII) or "_"
@@ -91,6 +91,6 @@ def _usd() -> tuple[Any, ...]:
         from pxr import Gf, Usd, UsdGeom, Vt
     except ImportError:
         raise _core.EvaluationError(
-            "USD is written by the package usd-core, which is not installed: pip install 'pycraft-soa[usd]'"
+            "USD output needs the package usd-core, which is not installed: pip install 'pycraft-soa[usd]'"
         ) from None
     return Gf, Usd, UsdGeom, Vt

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from .. import _core
 from ..file_targets import writable_target
 from ..models.multibody import Multibody
 from .coordinate_units import coordinate_units
+from .crossed_limits import CrossedLimit
 from .events import EventStates
 from .run_tables import HOLDS, columns_of, variables_of
 
@@ -21,15 +23,15 @@ FORMAT = "pycraft run 2"
 FORMATS = ("pycraft run 1", FORMAT)
 """Those that are read. Files of the first do not say with which accelerations steps end, nor what controllers hold."""
 ABOUT = ("effects", "workers", "energy", "integrator", "options", "precision")
-"""What a run says of itself beside its model."""
+"""Data of a run in addition to its model."""
 ENDINGS = (".nc", ".parquet", ".csv")
 BETWEEN = ("vdot_after", "vdot_before")
 """Columns of a Parquet file, where they differ from the accelerations at its rows: with which steps begin there, and end."""
 
 
 def checked_output(path: Any) -> Path:
-    """A path that a run can be written to. EvaluationError for an ending that is none of `ENDINGS`, OSError where it cannot be written,
-    ImportError where a package is missing: before the run, not after it."""
+    """Check, before the run, that a run can be written to a path. Raises EvaluationError for an ending not in `ENDINGS`, OSError if it
+    cannot be written, ImportError if a package is missing."""
     target = writable_target(path, ENDINGS, "a run")
     if target.suffix == ".parquet":
         _pyarrow()
@@ -43,43 +45,47 @@ def save(run: Any, path: str | Path) -> None:
 
 
 def load_run(path: str | Path) -> Any:
-    """The run that `Run.save` wrote to a NetCDF or Parquet file, with its model.
+    """Load a run that `Run.save` wrote to a NetCDF or Parquet file, with its model.
 
-    It has no scene behind it: it does not go on, and between its times there are configurations and velocities alone. Of Parquet these are
-    between the rows of the table, of NetCDF between the ends of steps.
+    It has no scene: it cannot be resumed, and between its times it has only configurations and velocities, interpolated for Parquet
+    between the rows of the table, for NetCDF between the ends of steps.
 
     Raises
     ------
     EvaluationError
         A file of another kind.
     OSError
-        None that can be read.
+        The file cannot be read.
     """
     target = Path(path)
     readers = {".nc": _from_netcdf, ".parquet": _from_parquet}
     if target.suffix not in readers:
-        raise _core.EvaluationError(f"{str(path)!r}: runs are read from files that end in {' and '.join(readers)}")
+        raise _core.EvaluationError(f"{str(path)!r}: a run can be read from files that end in {' and '.join(readers)}")
     if not target.is_file():
         raise FileNotFoundError(f"there is no file {str(path)!r}")
-    with target.open("rb"):  # OSError where it cannot be read at all
+    with target.open("rb"):  # OSError if it cannot be read at all
         pass
     try:
         return readers[target.suffix](target)
     except (ImportError, _core.EvaluationError):
         raise
-    except Exception as error:  # of damaged bytes anything may come
+    except Exception as error:  # damaged bytes may raise anything
         raise _core.EvaluationError(f"{str(path)!r} holds no run, or a damaged one ({error}); `run.save(path)` writes one") from None
 
 
-# ---------------------------------------------------------------------- what is told beside the numbers
+# ---------------------------------------------------------------------- data besides the numbers
 
 
 def _about(run: Any) -> str:
-    about = {name: value for name, value in run._about.items() if name != "model"}
+    about = {name: value for name, value in run._about.items() if name not in ("model", "stops")}
     events = {name: {key: getattr(e, key).tolist() for key in ("t", "q", "v", "states")} for name, e in run.events.items()}
     model = json.loads(json.dumps(run.model.description(), default=_plain))
+    crossed = [asdict(each) for each in run.crossed_limits]
     return json.dumps(
-        {"format": FORMAT, "model": model, "about": about, "events": events, "ended_by": run.ended_by, "statistics": run.statistics},
+        {
+            "format": FORMAT, "model": model, "about": about, "events": events, "ended_by": run.ended_by, "statistics": run.statistics,
+            "crossed_limits": crossed,
+        },
         default=_plain,
     )  # fmt: skip
 
@@ -96,9 +102,9 @@ def _run(
     told = json.loads(text)
     if told.get("format") not in FORMATS:
         known = " or ".join(repr(each) for each in FORMATS)
-        raise _core.EvaluationError(f"{str(path)!r} holds no run of this version: its format is {told.get('format')!r}, not {known}")
+        raise _core.EvaluationError(f"{str(path)!r} holds a run in the format {told.get('format')!r}; this version reads {known}")
     if missing := [name for name in ABOUT if name not in told["about"]]:
-        raise ValueError(f"it does not say: {', '.join(missing)}")
+        raise ValueError(f"it lacks: {', '.join(missing)}")
     about = told["about"] | {"model": Multibody.from_description(told["model"])}
     n, nq, nv = len(rows["t"]), about["model"].nq, about["model"].nv
     widths = {"t": (n,), "q": (n, nq), "v": (n, nv)}
@@ -110,12 +116,17 @@ def _run(
     if steps is not None:
         ends = len(steps["t"])
         steps = {name: x.reshape((ends, *(widths[name][1:] if name in widths else x.shape[1:]))) for name, x in steps.items()}
-    run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=told["statistics"])
+    statistics = told["statistics"]
+    if "switches" in statistics:
+        statistics["switches"] = [(at, method) for at, method in statistics["switches"]]
+    run = Run(about, shaped, steps=steps, events=events, ended_by=told["ended_by"], statistics=statistics)
     run.__dict__["_along"] = {
         **along,
         "forces": along["forces"].reshape(len(about["effects"]), n, nv),
         "vdot": along["vdot"].reshape(n, nv),
     }
+    if "crossed_limits" in told:
+        run.__dict__["crossed_limits"] = [CrossedLimit(**each) for each in told["crossed_limits"]]
     if steps is None:
         run._steps = {"t": run.t, "q": run.q, "v": run.v, "states": run.states, "work": run._work}
     return run
@@ -184,7 +195,7 @@ def _pyarrow() -> Any:
         import pyarrow
         import pyarrow.parquet
     except ImportError:
-        raise ImportError(f"Parquet needs pyarrow: {HOLDS}; '.nc' and '.csv' need nothing") from None
+        raise ImportError(f"Parquet needs pyarrow: {HOLDS}; '.nc' and '.csv' need no package") from None
     return pyarrow
 
 

@@ -32,14 +32,14 @@ from .viewed import Viewed
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a scene says of one state.
+    """Accelerations and forces of a scene at one state.
 
     Attributes
     ----------
     vdot : (nv,) rad/s² and m/s²
-    forces : by effect, (nv,) generalized forces: gravity's too, of prescribed motion what it needs, of rotors what they take. Their sum is
-        what inverse dynamics of the model without gravity gives at vdot.
-    passes : how often each pass of the plan ran
+    forces : by effect, (nv,) generalized forces: also of gravity, the required forces of prescribed motion, inertial forces of rotors.
+        Their sum is the inverse dynamics of the model without gravity at vdot.
+    passes : count of each pass of the plan
     """
 
     vdot: np.ndarray
@@ -73,14 +73,14 @@ class Effects(Mapping[str, Effect]):
 
 
 class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
-    """A model and the effects that act on it. It starts empty: only added effects act, and not even the model's own gravity does.
+    """A model and the effects that act on it. It starts empty: only added effects act, so not even the model's own gravity does.
 
-    A model whose gravity is set and a scene without a gravity effect are told apart once, by a ModelWarning.
+    A scene without a gravity effect warns once (ModelWarning) if the model's gravity is set.
 
     Parameters
     ----------
     model : Multibody
-    form, refine, residual, precision : how accelerations are solved for, as in `Multibody.forward_dynamics`; precision "double",
+    form, refine, residual, precision : options of the solution for accelerations, as in `Multibody.forward_dynamics`; precision "double",
         "extended" or "quad", of everything in a scene
 
     Examples
@@ -100,7 +100,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
 
     def __init__(self, model: Any, *, form: str = "fast", refine: Any = 0, residual: str = "same", precision: Any = "double"):
         if not isinstance(model, _core.Multibody):
-            raise _core.ModelError(f"a scene is of a model, not of {model!r:.80}")
+            raise _core.ModelError(f"Scene takes a model, not {model!r:.80}")
         self._model: Any = model
         self._entries: dict[str, tuple[Effect, bool]] = {}
         self._meanings = Meanings()
@@ -132,16 +132,16 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         Parameters
         ----------
         effects : effects of `pycraft.effects`, or callables (t, state) -> forces (`UserEffect`)
-        name : of a single one; its kind's by default ("damping"), with a number where that is taken ("damping_2")
+        name : name of a single effect; default: its kind ("damping"), with a number if that is used already ("damping_2")
 
         Raises
         ------
         ModelError
-            Names of the model that are not there, with the nearest; numbers that make no sense; a name that is taken; two effects that
-            claim the same coordinate. The scene is then as it was.
+            Unknown names of the model, with the nearest; invalid values; a name already in use; two effects that
+            claim the same coordinate. The scene is then unchanged.
         """
         if name is not None and len(effects) != 1:
-            raise _core.ModelError(f"name={name!r} is of one effect, not of {len(effects)}")
+            raise _core.ModelError(f"name={name!r} names one effect, but {len(effects)} were given")
         before, core = dict(self._entries), self._fresh_core()
         try:
             for given in effects:
@@ -157,28 +157,28 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         return self
 
     def _effects_on(self, names: set[str]) -> dict[str, list[str]]:
-        """Effects that name one of these bodies, hinges, coordinates or nodes, each with those that it names."""
+        """Return effects that name one of these bodies, hinges, coordinates or nodes, each with the names."""
         found = {name: sorted(effect.named() & names) for name, (effect, _) in self._entries.items()}
         return {name: named for name, named in found.items() if named}
 
     def _by_coordinate(self, hinges: set[str]) -> dict[str, list[str]]:
-        """Effects that take coordinates of one of these hinges one by one, each with those hinges; "" is all, in their order."""
+        """Return effects with separate values for coordinates of these hinges, each with the hinges; "" means all, in order."""
         found = {name: sorted(effect.by_coordinate() & hinges, reverse=True) for name, (effect, _) in self._entries.items()}
         return {name: named for name, named in found.items() if named}
 
     def _acting_on(self, coordinates: set[int]) -> list[str]:
-        """Effects that act on one of these coordinates as such."""
+        """Return effects that act directly on one of these coordinates."""
         return [name for name, (effect, _) in self._entries.items() if acted_on(effect, self._model) & coordinates]
 
     def _enter(self, name: str | None, effect: Effect, on: bool) -> None:
-        """One effect as a file has it, on or off."""
+        """Add an effect under a name, on or off."""
         called = self._fresh_core().add(name or "", effect.made_for(self._model), on)
         self._entries[called] = (effect, on)
         self._meanings.keep(called, effect, self._model)
         self._built = None
 
     def remove(self, *names: Any) -> Scene:
-        """Take effects out, by name or themselves; returns the scene."""
+        """Remove effects, given by name or as objects; return the scene."""
         for name in [self._name(name) for name in names]:
             del self._entries[name]
             self._meanings.forget(name)
@@ -186,15 +186,15 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         return self
 
     def enable(self, *names: Any) -> Scene:
-        """Turn effects on, by name or themselves. ModelError where another that is on claims the same coordinate."""
+        """Turn effects on, given by name or as objects. Raises ModelError if another effect that is on claims the same coordinate."""
         return self._turn(names, True)
 
     def disable(self, *names: Any) -> Scene:
-        """Turn effects off, by name or themselves: they stay in the scene and cost nothing."""
+        """Turn effects off, given by name or as objects: they stay in the scene and cost nothing."""
         return self._turn(names, False)
 
     def is_on(self, name: Any) -> bool:
-        """Whether an effect is on."""
+        """Return True if an effect is on."""
         return self._entries[self._name(name)][1]
 
     def _turn(self, names: tuple[Any, ...], on: bool) -> Scene:
@@ -229,7 +229,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         return core
 
     def _calls(self) -> _core.SceneCalls:
-        """What computes, made anew where effects or the model have changed."""
+        """Return the compiled calls, rebuilt after changes of effects or the model."""
         now = (
             self._model._parameters,
             self._how,
@@ -242,7 +242,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         return self._built[1]
 
     def _warn_of_gravity(self) -> None:
-        """Warn, once for each scene, that the model's own gravity is set and no effect of this scene is a gravity."""
+        """Warn once for each scene that the model's own gravity is set but the scene has no gravity effect."""
         if self._gravity_said or not any(self._model.gravity):
             return
         if any(isinstance(effect, (Gravity, PointMassGravity)) for effect, _ in self._entries.values()):
@@ -255,41 +255,41 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         )
 
     def _stops(self) -> tuple[Limits, ...]:
-        """The effects on that hold limits."""
+        """Return the effects that are on and hold limits."""
         return tuple(effect for effect, on in self._entries.values() if on and isinstance(effect, Limits))
 
     def _warn_of_limits(self, run: Run) -> None:
-        """Warn, once for each scene, of coordinates that left limits which no effect holds."""
+        """Warn once for each scene of coordinates that left limits that no effect holds."""
         if not self._limits_said and run.crossed_limits:
             self._limits_said = True
             warn_of_crossed_limits(self._model.name, run.crossed_limits)
 
     # ------------------------------------------------------------------ states and runs
     def evaluate(self, q=None, v=None, t: float | None = None, *, states=None, step: float = 0.0) -> Evaluation:
-        """Accelerations and forces at a state.
+        """Evaluate accelerations and forces at a state.
 
         Parameters
         ----------
-        q, v : (nq,), (nv,), by the rule of direct calls; beside an array q without v the model is at rest, and no pass that needs
+        q, v : (nq,), (nv,), by the rule of direct calls; with an array q and no v the model is at rest, and no pass that needs
             velocities runs
-        t : s; where left out that of the run's state that q is, else 0
-        states : of the effects' own; where left out those of the run's state that q is, else as they are at first
+        t : s; default: the time of the run's state given as q, else 0
+        states : the effects' own states; default: the states of the run given as q, else the initial ones
         step : s
-            Accelerations of an implicit step of this size: D has h C + h² K of implicit damping and stiffness in addition.
+            Return accelerations of an implicit step of this size: implicit damping and stiffness add h C + h² K to D.
 
         Raises
         ------
         ModelError
             q or v of another size, not finite.
         EvaluationError
-            An effect whose forces are not finite, by name, with the time; a time that is not.
+            An effect with forces that are not finite, by name, with the time; a time that is not finite.
         SingularHingeError
-            As forward dynamics.
+            As for forward dynamics.
 
         Warns
         -----
         ModelWarning
-            A state that is off loops which are kept, or moves off them, with the row and how far; none where gains draw it back.
+            A state that is off kept loops, or moves off them, with the row and the distance; none for loops with Baumgarte gains.
         """
         self._warn_of_gravity()
         resting = v is None and q is not None and not hasattr(q, "v")
@@ -306,7 +306,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         q=None,
         v=None,
         *,
-        integrator: str = "dopri5",
+        integrator: str = "auto",
         rtol: float = 1e-9,
         atol: float = 1e-12,
         step: float | None = None,
@@ -319,74 +319,74 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         dense: bool = True,
         output=None,
     ) -> Run:
-        """The motion from a state at t = 0 to T.
+        """Simulate the motion from a state at t = 0 to T.
 
         Parameters
         ----------
         T : s
         q, v : (nq,), (nv,) at t = 0, by the rule of direct calls; prescribed coordinates are their motion's
-        integrator : {"dopri5", "auto", "dop853", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "DOP853", "cvode", ...}
-            docs/simulation.md says when to take which. "rosenbrock4" is for stiff scenes, and "auto" takes it where the motion is stiff;
-            "variational2" and "variational4" are for long ones; "semi-implicit-euler" (order 1) takes implicit damping and stiffness into
-            D: stable for any, while explicit stiffness beside them bounds the step.
+        integrator : {"auto", "dopri5", "dop853", "rosenbrock4", "rkmk4", "semi-implicit-euler", "variational2", "DOP853", "cvode", ...}
+            docs/simulation.md explains the choice. "auto" equals "dopri5", bit for bit, until the motion becomes stiff, and uses
+            "rosenbrock4" as long as it is; "variational2" and "variational4" are for long runs; "semi-implicit-euler" (order 1) adds
+            implicit damping and stiffness to D: stable for any values, while explicit stiffness still limits the step.
         rtol, atol : tolerances on the error of one step, per component of q, v and the effects' own states
         step : s
-            Of one-size steps; the first step of the others, chosen if left out.
-        max_step : s, no controlled step is longer; None: any
-        t_eval : (K,) s, rising, from 0 to T at most; the end of every step where left out
-        events : a function (t, state) -> float whose zeros are looked for, an `Event`, a list of either, or a dictionary by name
-            Functions may have SciPy's attributes `direction` and `terminal`. `Run.events` has the states at the zeros.
+            Size of fixed steps; for other integrators the first step, chosen automatically by default.
+        max_step : s, longest controlled step; None: no limit
+        t_eval : (K,) s, rising, within 0 to T; default: the end of every step
+        events : a function (t, state) -> float whose zeros are located, an `Event`, a list of either, or a dictionary by name
+            Functions may have SciPy's attributes `direction` and `terminal`. `Run.events` holds the states at the zeros.
         energy : bool
-            Whether the work of each effect is kept account of, for `Run.energy`.
+            True records the work of each effect, for `Run.energy`.
         normalise : {"never", "each step"}
-            Whether quaternions are set to unit length after each step.
+            "each step" sets quaternions to unit length after each step.
         progress : bool
-            Whether a run of more than a second shows how far it is, in a terminal or notebook.
+            True shows the progress of a run longer than a second, in a terminal or notebook.
         dense : bool
-            Whether the ends of all steps are kept beside the times of t_eval, for `Run.at`; without t_eval they are.
-        output : path that ends in ".nc", ".parquet" or ".csv", where the run is written; refused before the run if it cannot be
+            True keeps the ends of all steps in addition to t_eval, for `Run.at`; without t_eval they are always kept.
+        output : path of a file for the run, ending in ".nc", ".parquet" or ".csv"; checked before the run
 
         Raises
         ------
         EvaluationError
-            Unknown names, times out of order, tolerances below the precision, an integrator that does not fit an effect or the precision
-            (both are named); the time where the step size falls to rounding or the state is no longer finite, with the coordinate; an
-            effect whose forces are not finite, by name, with the time; an event that gives no number.
+            Unknown names, times out of order, tolerances below the precision, an integrator unsuited to an effect or the precision
+            (both are named); a step size that falls to rounding or a state that is not finite, with the time and the coordinate; an
+            effect with forces that are not finite, by name, with the time; an event that returns no number.
         SingularHingeError
-            Of forward dynamics, with the time.
+            As for forward dynamics, with the time.
         OSError
             An output that cannot be written.
 
-        What was computed before an error or Ctrl-C is the error's attribute `run`, and `scene.last_run`.
+        After an error or Ctrl-C, the attribute `run` of the exception, and `scene.last_run`, hold the run computed so far.
         """
         options = RunOptions.checked(integrator, rtol, atol, step, max_step, normalise, energy)
         return simulate(self, T, q, v, options, t_eval=t_eval, events=events, progress=bool(progress), dense=bool(dense), output=output)
 
     def resume(self, checkpoint, T: float, *, t_eval=None, events=None, progress: bool = True, dense: bool = True, output=None) -> Run:
-        """The motion goes on from a checkpoint to T, with the integrator, tolerances and accounts that it has.
+        """Resume the motion from a checkpoint to T, with the checkpoint's integrator, tolerances and recorded works.
 
-        For one-step methods it is bit for bit what a run to T would have been, but for "bulirsch-stoer", which remembers what order was
-        best, and for integrators of other packages. The first state is the checkpoint's: where the end of a run cut its last step short,
-        the start of that step, which is taken again. Works go on from what they were.
+        For one-step methods the result equals an uninterrupted run bit for bit, except for "bulirsch-stoer", which remembers the best
+        order, and for integrators of other packages. The first state is the checkpoint's: if the end of a run cut its last step short,
+        the start of that step, which is repeated. Works continue from their former values.
 
         Parameters
         ----------
-        checkpoint : Checkpoint, a run that has one, or the path of a saved one
+        checkpoint : Checkpoint, a run with one, or the path of a saved one
         T : s, later than the checkpoint
-        t_eval, events, progress, dense, output : as `simulate` takes them; give the same events, in the same order
+        t_eval, events, progress, dense, output : as for `simulate`; give the same events, in the same order
 
         Raises
         ------
         ModelError
-            A checkpoint of another scene: another model's name, other effects that are on, another precision.
+            A checkpoint of another scene: with another model's name, other active effects, or another precision.
         EvaluationError
-            As `simulate`; a file that holds no checkpoint.
+            As for `simulate`; a file without a checkpoint.
         """
         return resume(self, checkpoint, T, t_eval=t_eval, events=events, progress=bool(progress), dense=bool(dense), output=output)
 
     @property
     def last_run(self) -> Run | None:
-        """The last run, also one that an error or Ctrl-C ended; None before the first."""
+        """The last run, even if an error or Ctrl-C ended it; None before the first."""
         return self._last_run
 
     def _names_on(self) -> list[str]:
@@ -394,9 +394,9 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
 
     # ------------------------------------------------------------------ what it is
     def explain(self, at: str = "motion") -> str:
-        """The plan as a table: the passes of an evaluation, what each does, and the effects that it is there for.
+        """Return the plan as a table: the passes of an evaluation, the work of each, and the effects that need it.
 
-        at : {"motion", "rest", "works"}: of a motion, of a state at rest, of a run that keeps account of works
+        at : {"motion", "rest", "works"}: in motion, at rest, or in a run that records works
         """
         if at not in ("motion", "rest", "works"):
             raise _core.EvaluationError(f"at={at!r}: there are 'motion', 'rest' and 'works'")
@@ -414,7 +414,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
         return "\n".join(lines if self._entries else [*lines, "  empty"])
 
     def _shown(self, effect: Effect) -> Effect:
-        """An effect with the values that it takes from the model; as it is where an edit of the model took what it names."""
+        """Return an effect with the values taken from the model; unchanged if an edit of the model removed a name that it uses."""
         try:
             return effect.completed_for(self._model)
         except _core.ModelError:
@@ -429,7 +429,7 @@ class Scene(Measurements, Statics, OnLoops, Filed, Viewed, Closed, Renamed):
 
 
 def _of_function(given: Any) -> UserEffect:
-    """An effect of a user's function. ModelError for what is neither an effect nor a function."""
+    """Return the effect of a user's function. Raises ModelError for objects that are neither effects nor functions."""
     if isinstance(given, type) and issubclass(given, Effect):
         got = f"the class {given.__name__} (forgotten parentheses?)"
     elif isinstance(given, type):

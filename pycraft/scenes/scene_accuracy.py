@@ -1,4 +1,4 @@
-"""What accuracy costs in time, for a scene: integrators and tolerances, forms, refinements and precisions, and effects, in one picture."""
+"""Cost of accuracy of a scene: integrators and tolerances, forms, refinements and precisions, and effects, in one picture."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ INTEGRATORS = ("dopri5", "dop853", "rkmk4")
 PRECISIONS = ("double", "extended")
 REFINEMENTS = ((0, "same"), (1, "wider"))
 REFERENCE = ("dop853", 1e-16)
-"""By which the reference is found, in extended precision: the integrator of high order and its tolerance."""
+"""Integrator of high order, and its tolerance, for the reference in extended precision."""
 FINE = ("dop853", 50.0)
-"""By which forms, refinements and precisions are told apart: the integrator, and its tolerance over the precision's rounding."""
+"""Integrator that compares forms, refinements and precisions, and its tolerance relative to the precision's rounding."""
 USUAL = ("dopri5", "rosenbrock4")
-"""The integrators of scenes that lack an effect: the first that fits."""
+"""Integrators for scenes without an effect: the first suitable one is used."""
 USUAL_TOLERANCE = 1e-9
 """Theirs."""
 
 
 class SceneAccuracyTable(WorkPrecisionTable):
-    """Rows of `Scene.accuracy`: one run each, by what is varied.
+    """Rows of `Scene.accuracy`: one run each, grouped by the varied option.
 
     Each row is a dictionary with the columns of `WorkPrecisionTable`, of which "drift" is None, and: "varied" ("integrator", "arithmetic"
     or "effects"), "left out" (names of effects), "form", "refine", "residual", "precision", "pareto" (no other row is faster and more
@@ -71,7 +71,7 @@ class SceneAccuracyTable(WorkPrecisionTable):
         return sorted((row for row in self.rows if row["pareto"]), key=lambda row: row["seconds"])
 
     def way(self, row: dict[str, Any]) -> str:
-        """What is unusual about a row, in words."""
+        """Return the differences of a row from the default, in words."""
         if row["varied"] == "effects":
             return f"without {' + '.join(row['left out'])}"
         if row["varied"] == "arithmetic":
@@ -96,7 +96,7 @@ class SceneAccuracyTable(WorkPrecisionTable):
         return self.way(row) or f"{row['integrator']} at {self.cell('tolerance', row)}"
 
     def plot(self, ax: Any = None) -> Any:
-        """Error of the trajectory against the time of a run, both logarithmic, the Pareto front drawn; returns the axes."""
+        """Plot the error of the trajectory against run time, both logarithmic, with the Pareto front; return the axes."""
         from .cost_pictures import scene_accuracy_plot
 
         return scene_accuracy_plot(self, ax)
@@ -145,7 +145,7 @@ def accuracy(
 
 
 Way = tuple[dict[str, Any], Any, str, dict[str, float]]
-"""Columns of a row, the scene that runs, the integrator and its options."""
+"""Columns of a row, the scene to run, the integrator and its options."""
 
 
 def _way(scene: Any, varied: str, left_out: Sequence[str] = ()) -> dict[str, Any]:
@@ -157,7 +157,7 @@ def _way(scene: Any, varied: str, left_out: Sequence[str] = ()) -> dict[str, Any
 
 
 def _integrators(scene: Any, integrators: Any, tolerances: Any, steps: Any) -> list[Way]:
-    """The scene as it is, by integrators at tolerances or steps."""
+    """Yield the unchanged scene with integrators at tolerances or steps."""
     names = checked_names(INTEGRATORS if integrators is None else integrators, "integrators", "integrator", integrator_names())
     controlled = checked_positive(TOLERANCES if tolerances is None else tolerances, "tolerances", "a positive, finite tolerance")
     sizes = checked_positive(STEPS if steps is None else steps, "steps", "a positive, finite number of seconds")
@@ -169,7 +169,7 @@ def _integrators(scene: Any, integrators: Any, tolerances: Any, steps: Any) -> l
 
 
 def _arithmetic(scene: Any, forms: Any, refinements: Any, precisions: Any) -> list[Way]:
-    """Forms and refinements in the scene's precision, and the scene in others, by an integrator of high order at a fine tolerance."""
+    """Yield forms and refinements in the scene's precision, and other precisions, with an integrator of high order at a fine tolerance."""
     form, refine, residual, precision = scene._how
     shapes = checked_names(_core.forms() if forms is None else forms, "forms", "form", _core.forms())
     refined = checked_refinements(list(REFINEMENTS) if refinements is None else refinements)
@@ -194,7 +194,7 @@ def _effects(scene: Any, without: Any) -> list[Way]:
 
 
 def _fitting(scene: Any) -> str:
-    """The first of `USUAL` that fits; the first of all where none does, for what it says of that."""
+    """Return the first suitable integrator of `USUAL`; if none is suitable, the first, which raises the error."""
     for name in USUAL:
         try:
             _core.check_pairing(scene._calls(), name, False, False)
@@ -205,7 +205,7 @@ def _fitting(scene: Any) -> str:
 
 
 def _at_states(scene: Any) -> Any:
-    """The scene whose effects all act at states, with the same equations of motion: implicit ones are those that they come to."""
+    """Return the scene with effects that all act at states, with the same equations of motion: implicit effects become their limits."""
     other = _as(scene, scene._how)
     other._entries.update({name: (effect.at_states(scene.model), on) for name, (effect, on) in scene._entries.items()})
     return other
@@ -216,7 +216,7 @@ def _options(integrator: str, amount: float) -> dict[str, float]:
 
 
 def _as(scene: Any, how: Sequence[Any]) -> Any:
-    """The scene solved in another way: form, refinement, residual, precision."""
+    """Return the scene with another form, refinement, residual or precision."""
     form, refine, residual, precision = how
     other = type(scene)(scene.model, form=form, refine=refine, residual=residual if refine else "same", precision=precision)
     other._entries.update(scene._entries)
@@ -224,7 +224,7 @@ def _as(scene: Any, how: Sequence[Any]) -> Any:
 
 
 def _by(scene: Any, times: np.ndarray, q: Any, v: Any) -> Integrate:
-    """Runs of a scene, as `measured_row` takes them."""
+    """Return a function that runs a scene, for `measured_row`."""
 
     def integrate(integrator: str, **options: Any) -> Run:
         run, took = timed_run(scene, times, q, v, integrator=integrator, **options)

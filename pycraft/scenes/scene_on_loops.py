@@ -1,4 +1,4 @@
-"""The loops that a scene keeps, and loops that close while it moves."""
+"""Loops that a scene keeps, and loops that close during motion."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .effects import Effect, Loop
 
 
 def _keeps(effect: Effect) -> TypeGuard[Loop]:
-    """Whether it keeps loops."""
+    """Return True if an effect keeps loops."""
     return isinstance(effect, Loop) and effect.keeps
 
 
 class OnLoops:
-    """What a scene knows of its loops."""
+    """Methods of a scene for its loops."""
 
     _model: Any
     _entries: dict[str, tuple[Effect, bool]]
@@ -30,45 +30,45 @@ class OnLoops:
     is_on: Callable[[Any], bool]
 
     def _kept_loops(self) -> list[str]:
-        """The loops that effects which are on keep, by name."""
+        """Return the loops kept by active effects, by name."""
         return [name for effect, on in self._entries.values() if on and _keeps(effect) for name in effect.kept(self._model)]
 
     def _keeps_loops(self) -> bool:
-        """Whether an effect that is on keeps loops."""
+        """Return True if an active effect keeps loops."""
         return any(on and _keeps(effect) for effect, on in self._entries.values())
 
     def _loops_now(self) -> tuple[int, bytes]:
-        """What its loops count of their changes, and where springs hold them the present q: they are no part of the model's numbers."""
+        """Return the change counts of its loops, and for loops held by springs the present q, which the model does not count."""
         loops = [effect for effect, _ in self._entries.values() if isinstance(effect, Loop)]
         held = any(not effect.keeps for effect in loops)
         return self._model.loops._core.edits if loops else 0, np.asarray(self._model.q).tobytes() if held else b""
 
     def close_loops(self, *effects: Any, q: Any = None, v: Any = None, t: float = 0.0) -> State:
-        """Turn effects that keep loops on where a motion meets them, and take its state onto all loops that are kept: a plastic impact.
+        """Turn on effects that keep loops when a motion reaches them, and project its state onto all kept loops: a plastic impact.
 
-        (ℳ + J)(v⁺ - v) = Q*λ,   Q v⁺ = 0: the impulse of the loops, which leaves the velocities nearest in kinetic energy, whatever the
-        method of the effects. Rotors are in J, prescribed coordinates go on as they are told. q is moved by Newton's steps as far as an
-        event's time is off. What the impact loses is the difference of kinetic energies. `disable` opens loops: states go on as they are.
+        (ℳ + J)(v⁺ - v) = Q*λ,   Q v⁺ = 0: the impulse of the loops, which gives the nearest velocities in kinetic energy, for any
+        method of the effects. J includes rotors, and prescribed coordinates continue as prescribed. Newton's steps move q by the error of
+        an event's time. The loss of the impact is the difference of kinetic energies. `disable` opens loops without changing states.
 
         Parameters
         ----------
-        effects : names, or effects themselves; none: those that are on as they are
+        effects : names or effects; none: keep the effects that are on
         q, v : (nq,), (nv,) at t, by the rule of direct calls
         t : s
 
         Returns
         -------
-        State : where the motion goes on
+        State : the state from which the motion continues
 
         Raises
         ------
         ModelError
-            Effects that the scene does not have, that keep no loops; arrays of another shape, not finite; rows that ask for different
-            velocities, as of what is prescribed.
+            Effects that the scene does not have, or that keep no loops; arrays of a wrong shape, or not finite; rows that require different
+            velocities, such as rows of prescribed coordinates.
         EvaluationError
-            A state further off the loops than 10⁻⁴, with the rows. The effects are then as they were.
+            A state farther off the loops than 10⁻⁴, with the rows. The effects are then unchanged.
         SingularHingeError
-            As forward dynamics of the tree.
+            As for forward dynamics of the tree.
 
         Examples
         --------
@@ -83,7 +83,7 @@ class OnLoops:
         names = [self._name(effect) for effect in effects]
         for name in names:
             if not _keeps(self._entries[name][0]):
-                raise _core.ModelError(f"effect {name!r} keeps no loops: there is nothing that it closes; enable it")
+                raise _core.ModelError(f"effect {name!r} keeps no loops to close; turn it on with enable")
         before = [name for name in names if not self.is_on(name)]
         try:
             self.enable(*names)

@@ -1,4 +1,4 @@
-"""Quadratic models of scenes near states and along runs: their effects included."""
+"""Quadratic models of scenes near states and along runs, including their effects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def quadratic_model(scene: Any, q: Any, v: Any, t: Any, *, states: Any, inputs: 
     """`Scene.quadratic_model`."""
     if scene._keeps_loops():
         raise _core.EvaluationError(
-            f"scene of {scene.model.name!r}: it keeps loops, of which quadratic models are not made; linearize is of the first order"
+            f"scene of {scene.model.name!r}: it keeps loops, which quadratic models do not support; linearize gives the first order"
         )
     model, (t, states) = scene.model, moment_of(q, t, states)
     linear = linearize(scene, q, v, t, states=states, inputs=inputs, outputs=None, dt=None, method="zoh", independent=None)
@@ -36,11 +36,11 @@ def quadratic_model(scene: Any, q: Any, v: Any, t: Any, *, states: Any, inputs: 
 class SceneRates:
     """(v̇, ẏ) of a scene at states (B, ...), their derivatives along z = (displacements, v, y, τ), and second ones contracted.
 
-    With F = ID(q, v, v̇) - T(q, v, y) of the coordinates that are free, T the effects' forces, μ = (ℳ + J)⁻*λ and G = ∂(v̇, ẏ)/∂z
+    With F = ID(q, v, v̇) - T(q, v, y) of the free coordinates, T the effects' forces, μ = (ℳ + J)⁻*λ and G = ∂(v̇, ẏ)/∂z
 
         λ*∂²(v̇, ẏ)/∂z∂z = -(∂²p/∂z∂z + ∂²p/∂z∂v̇ G + (∂²p/∂z∂v̇ G)*) + ∂²(μ*T + λ*ẏ)/∂z∂z,    p = μ*ID
 
-    as `pycraft.dynamics.second_order.Accelerations` has it for a model. Known coordinates are where their motion has them.
+    as in `pycraft.dynamics.second_order.Accelerations` for a model. Known coordinates follow their motion.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class SceneRates:
     """
 
     def __init__(self, scene: Any, q: np.ndarray, rest: np.ndarray, t: np.ndarray, between: bool = True):
-        """between : between the ends of a step, where controllers take no samples; else `rest` may be v alone, y as it is at first."""
+        """between : True between the ends of a step, where controllers take no samples; else `rest` may be only v, with the initial y."""
         self._scene, self._t, calls = scene, t, scene._calls()
         self._nv = nv = scene.model.nv
         states = zip(q, rest[:, :nv], t.tolist(), rest[:, nv:].tolist(), strict=True)
@@ -66,31 +66,31 @@ class SceneRates:
             given = np.eye(nv + own, nv)
             given[known_coordinates(one)] = 0.0
             slopes[:] = solved(one, given)
-        self._curvature(np.zeros((len(q), 0, nv + own)))  # which refuses states that have none
+        self._curvature(np.zeros((len(q), 0, nv + own)))  # refuses states without second derivatives
 
     @property
     def known(self) -> list[int]:
-        """Coordinates that go where they are told."""
+        """Prescribed coordinates."""
         return known_coordinates(self._found[0]) if self._found else []
 
     @property
     def implicit(self) -> list[str]:
-        """Effects that steps may take implicitly."""
+        """Effects that steps may treat implicitly."""
         return self._found[0]["implicit"] if self._found else []
 
     def later(self, q: np.ndarray, rest: np.ndarray, seconds: float) -> SceneRates:
-        """At other states, so much later."""
+        """Return the same at other states, at a later time."""
         return SceneRates(self._scene, q, rest, self._t + seconds)
 
     def placed(self, q: np.ndarray, rest: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-        """q and rest with known coordinates where their motion has them so much later."""
+        """Return q and rest with known coordinates set by their motion at a later time."""
         if not self.known:
             return q, rest
         there = self.later(q, rest, seconds)
         return there.q, there.rest
 
     def hessians(self, costate: np.ndarray) -> np.ndarray:
-        """λ*∂²(v̇, ẏ)/∂z∂z, (B, m, 3 nv + own, 3 nv + own), of λ (B, m, nv + own)."""
+        """Return λ*∂²(v̇, ẏ)/∂z∂z, (B, m, 3 nv + own, 3 nv + own), for λ (B, m, nv + own)."""
         mass = np.array([one["mass"] for one in self._found]).reshape(len(costate), *2 * costate.shape[-1:])
         along, forces = self._curvature(np.swapaxes(np.linalg.solve(np.swapaxes(mass, -1, -2), np.swapaxes(costate, -1, -2)), -1, -2))
         return curved(along, self.slopes, forces)

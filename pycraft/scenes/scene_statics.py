@@ -1,4 +1,4 @@
-"""Scenes at rest, and the forces that hinges carry under their effects."""
+"""Equilibria of scenes, and the forces in hinges under their effects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..state import at_state, moment_of
 
 
 class Statics:
-    """What hinges carry, and where everything balances."""
+    """Forces in hinges, and equilibria."""
 
     model: Any
     _calls: Any
@@ -27,20 +27,20 @@ class Statics:
         self, hinges: Any = None, q=None, v=None, t: Any = None, *, states: Any = None, axes: Any = "body", about: Any = None,
         part: str = "whole",
     ) -> np.ndarray:  # fmt: skip
-        """The spatial forces (moment; force) that parents put on their children at a state, under all effects: N m and N.
+        """Return the spatial forces (moment; force) of parents on their children at a state, under all effects: N m and N.
 
         Parameters
         ----------
         hinges : a name or `Hinge`, or a list of them; None: all, in the model's order
         q, v : (nq,), (nv,), each with an optional leading batch axis, by the rule of direct calls
-        t, states : as in `evaluate`, one or one for each state
-        axes, about, part : as in `Multibody.interbody_forces`; frames that a function moves are where they are at t
+        t, states : as in `evaluate`, a single one or one for each state
+        axes, about, part : as in `Multibody.interbody_forces`; frames moved by a function are placed at t
 
         Returns
         -------
-        (N, 6) or (B, N, 6); of one hinge (6,) or (B, 6). Along a run: `Run.interbody_forces`.
+        (N, 6) or (B, N, 6); for one hinge (6,) or (B, 6). Along a run: `Run.interbody_forces`.
 
-        Raises what `evaluate` and `Multibody.interbody_forces` raise.
+        Raises the errors of `evaluate` and `Multibody.interbody_forces`.
 
         Examples
         --------
@@ -62,7 +62,7 @@ class Statics:
         many = sorted({len(x) for x in (times, q, v, own) if x.ndim == 2})
         if len(many) > 1 or own.ndim > 2:
             times_too = f", t {times.shape[:-1]}" if times.ndim == 2 else ""
-            raise _core.ModelError(f"batches of q {q.shape}, v {v.shape} and states {own.shape}{times_too} in one call")
+            raise _core.ModelError(f"q {q.shape}, v {v.shape} and states {own.shape}{times_too} are batches of different sizes")
         time, q, v, own = (np.broadcast_to(x, (*(many or [1]), x.shape[-1])) for x in (times, q, v, own))
         f = forces_of_scene(self._calls(), self.model, time[:, 0], q, v, own, hinges, axes, about, part)
         return f if many else f[0]
@@ -71,23 +71,23 @@ class Statics:
         self, q0: Any = None, t: float = 0.0, *, states: Any = None, hold: Any = (), limits: bool = False, stable: bool = False,
         tolerance: float = TOLERANCE,
     ) -> Any:  # fmt: skip
-        """A configuration at which all effects balance and nothing moves: found, judged and refused as `Multibody.equilibrium`.
+        """Find a configuration at rest where all effects balance, with the tests and errors of `Multibody.equilibrium`.
 
-        The model's own gravity counts for nothing; effects that act in motion alone give no force. Effects' own states are held, and
-        prescribed coordinates are where their motion has them at t. Where effects keep loops the search starts at the state on them near
-        q0, and what balances forces are the loops', too (docs/loops.md).
+        The model's own gravity does not act; effects that act only in motion give no force. Effects' own states are held, and
+        prescribed coordinates follow their motion at t. If effects keep loops, the search starts at the state on them near
+        q0, and forces of the loops also balance (docs/loops.md).
 
         Parameters
         ----------
-        q0 : (nq,) or a State, or (B, nq); the model's present state where left out
+        q0 : (nq,) or a State, or (B, nq); default: the model's present state
         t : s
-        states : of the effects' own; as they are at first where left out
+        states : the effects' own states; default: the initial ones
         hold, limits, stable, tolerance : as in `Multibody.equilibrium`
 
         Raises
         ------
         EvaluationError
-            As `Multibody.equilibrium`; a scene in another precision than double.
+            As for `Multibody.equilibrium`; a scene in another precision than double.
 
         Examples
         --------
@@ -107,7 +107,7 @@ class Statics:
             return Balance(found["residual"], found["along_q"], found["mass"], found["size"])
 
         def one(q: np.ndarray) -> Equilibrium:
-            placed = _core.scene_at_rest(calls, q, time, own)  # with prescribed coordinates where they are at t
+            placed = _core.scene_at_rest(calls, q, time, own)  # with prescribed coordinates at t
             fixed = {*held, *np.flatnonzero(placed["known"])}
             if self._keeps_loops():
                 return solved_on_loops(self.model, at, placed["q"], self._kept_loops(), fixed, bool(limits), bool(stable), tolerance)

@@ -1,4 +1,4 @@
-"""Runs of scenes: what is asked of the core, and what becomes of errors and interrupts."""
+"""Runs of scenes: calls of the core, and the treatment of errors and interrupts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .runs_on_disk import checked_output
 
 @dataclass
 class RunOptions:
-    """What a run is told, checked; `told` is what a checkpoint keeps of it."""
+    """Checked options of a run; `told` are the options kept in a checkpoint."""
 
     integrator: IntegratorName
     rtol: float
@@ -34,12 +34,12 @@ class RunOptions:
 
     @classmethod
     def checked(cls, integrator: Any, rtol: Any, atol: Any, step: Any, max_step: Any, normalise: Any, energy: Any) -> RunOptions:
-        """EvaluationError for what makes no sense."""
+        """Check the options. Raises EvaluationError for invalid ones."""
         chosen = integrator_named(integrator)
         if normalise not in ("never", "each step"):
             raise _core.EvaluationError(f"normalise={normalise!r}: there are 'never' and 'each step'")
         if chosen.foreign and normalise != "never":
-            raise _core.EvaluationError(f"integrator {chosen.name!r} has no normalise={normalise!r}; there is 'never'")
+            raise _core.EvaluationError(f"integrator {chosen.name!r} does not support normalise={normalise!r}; use 'never'")
         sizes = []
         for name, value in (("step", step), ("max_step", max_step)):
             sizes.append(0.0 if value is None else one_number(value, name))
@@ -53,7 +53,7 @@ class RunOptions:
 
 
 def run_times(start: float, T: Any, t_eval: Any) -> tuple[list[float], slice]:
-    """Times for the core, and which of what comes back was asked for."""
+    """Return times for the core, and the indices of the requested results."""
     end = one_number(T, "T")
     if not (start < end < np.inf):
         raise _core.EvaluationError(
@@ -63,17 +63,17 @@ def run_times(start: float, T: Any, t_eval: Any) -> tuple[list[float], slice]:
         return [start, end], slice(None)
     times = np.atleast_1d(_core.real_array(t_eval, "t_eval"))
     if times.ndim != 1 or not times.size:
-        raise _core.EvaluationError(f"t_eval: times (K,) in seconds, one at least, not an array {times.shape}")
+        raise _core.EvaluationError(f"t_eval must be at least one time, (K,) in seconds, not an array {times.shape}")
     if not np.isfinite(times).all():
         at = int(np.flatnonzero(~np.isfinite(times))[0])
-        raise _core.EvaluationError(f"t_eval: entry {at} is {times[at]:g}; times are finite numbers of seconds")
+        raise _core.EvaluationError(f"t_eval: entry {at} is {times[at]:g}; times must be finite numbers of seconds")
     if not (np.diff(times) > 0).all():
         at = int(np.flatnonzero(~(np.diff(times) > 0))[0])
         raise _core.EvaluationError(
-            f"t_eval: entry {at + 1} is {times[at + 1]:g} s after {times[at]:g} s; times rise: np.unique(t_eval) sorts them"
+            f"t_eval: entry {at + 1} is {times[at + 1]:g} s after {times[at]:g} s; times must rise: np.unique(t_eval) sorts them"
         )
     if times[0] < start or times[-1] > end:
-        raise _core.EvaluationError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s; the run goes from {start:g} to T = {end:g} s")
+        raise _core.EvaluationError(f"t_eval goes from {times[0]:g} to {times[-1]:g} s; the run lasts from {start:g} to T = {end:g} s")
     before, after = times[0] > start, times[-1] < end
     return [*([start] if before else []), *times.tolist(), *([end] if after else [])], slice(int(before), len(times) + int(before))
 
@@ -81,7 +81,7 @@ def run_times(start: float, T: Any, t_eval: Any) -> tuple[list[float], slice]:
 def simulate(
     scene: Any, T: Any, q: Any, v: Any, options: RunOptions, *, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any
 ) -> Run:
-    """The motion of a scene from a state at t = 0 to T, as `Scene.simulate` says."""
+    """Simulate the motion of a scene from a state at t = 0 to T; see `Scene.simulate`."""
     times, keep = run_times(0.0, T, t_eval)
     q, v = at_state(scene.model, q, v)
     run = _run(scene, options, times, keep, t_eval, events, progress, dense, output, q, v, None)
@@ -91,20 +91,20 @@ def simulate(
 
 
 def continued(scene: Any, t: float, T: float, q: Any, v: Any, states: Any, options: RunOptions) -> Run:
-    """The motion from any state at any time to T: its ends alone, without a checkpoint. A viewer's scene goes on in such pieces.
+    """Continue the motion from any state at any time to T, keeping only its ends, without a checkpoint. A viewer advances its scene so.
 
     Parameters
     ----------
     t, T : s
     q, v : (nq,), (nv,)
-    states : of the effects' own, as many as those that are on have; as they are at first where empty
+    states : the own states of the effects that are on; empty: the initial ones
     """
     times, keep = run_times(t, T, [t, T])
     return _run(scene, options, times, keep, times, None, False, False, None, q, v, None, states)
 
 
 def resume(scene: Any, checkpoint: Any, T: Any, *, t_eval: Any, events: Any, progress: bool, dense: bool, output: Any) -> Run:
-    """The motion from a checkpoint to T, as `Scene.resume` says."""
+    """Resume the motion from a checkpoint to T; see `Scene.resume`."""
     if isinstance(checkpoint, Run):
         checkpoint = checkpoint.checkpoint()
     if not isinstance(checkpoint, Checkpoint):
@@ -119,12 +119,12 @@ def resume(scene: Any, checkpoint: Any, T: Any, *, t_eval: Any, events: Any, pro
         first = next((pair for pair in zip(were, are, strict=False) if pair[0] != pair[1]), None)
         but = f"{len(were)}, and there are {len(are)}" if first is None else f"{first[0]!r} where this model has {first[1]!r}"
         raise _core.ModelError(
-            f"the checkpoint is of {scene.model.name!r} before an edit of its structure: of the coordinates {but}; simulate anew"
+            f"the checkpoint is of {scene.model.name!r} before an edit of its structure: among the coordinates {but}; simulate again"
         )
     told = checkpoint.options
     options = RunOptions(integrator_named(checkpoint.integrator), **told)
     times, keep = run_times(checkpoint.t, T, t_eval)
-    zero = scene.model.zero_q(), np.zeros(scene.model.nv)  # the state is the checkpoint's
+    zero = scene.model.zero_q(), np.zeros(scene.model.nv)  # the checkpoint has the state
     run = _run(scene, options, times, keep, t_eval, events, progress, dense, output, *zero, checkpoint.state)
     scene._warn_of_limits(run)
     warn_of_doubts(scene, run)
@@ -160,7 +160,7 @@ def _run(
             )  # fmt: skip
         except (Exception, KeyboardInterrupt) as error:
             if len(record.samples["t"]):
-                scene._last_run = error.run = made()  # type: ignore[union-attr]  # what was computed by then
+                scene._last_run = error.run = made()  # type: ignore[union-attr]  # the run computed so far
             raise
     scene._last_run = run = made()
     if written is not None:
@@ -171,11 +171,11 @@ def _run(
 def simulate_together(
     scene: Any, T: Any, calls: list[Any], q: np.ndarray, v: np.ndarray, options: RunOptions, *, t_eval: Any, dense: bool
 ) -> list[Run | Exception]:
-    """Runs of one model side by side in packs of states, each bit for bit what `simulate` gives, or what ended it.
+    """Run simulations of one model side by side in packs of states; return for each the result of `simulate`, bit for bit, or its error.
 
     Parameters
     ----------
-    calls : of the scene as it is in each run; none of which `alone` says that it is not for packs
+    calls : the compiled scene of each run, for runs suited to packs by `alone`
     q, v : (n, nq), (n, nv) at t = 0
     """
     times, keep = run_times(0.0, T, t_eval)
@@ -196,9 +196,9 @@ def _found(scene: Any, calls: Any, record: Any, options: RunOptions, keep: slice
 
 
 def alone(calls: Any, options: RunOptions) -> str:
-    """Why runs are not for packs, in words; "" if they are."""
+    """Return why runs are not suited to packs; "" if they are."""
     if options.integrator.foreign:
-        return f"integrator {options.integrator.name!r} is another package's"
+        return f"integrator {options.integrator.name!r} belongs to another package"
     return str(_core.alone(calls, options.integrator.name))
 
 

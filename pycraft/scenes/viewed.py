@@ -1,4 +1,4 @@
-"""The face of a scene that leads to the live viewer, a room above."""
+"""The method of a scene that opens the live viewer, which is in a higher layer."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from .. import _core
 
 
 class Viewed:
-    """A scene to look at while it plays."""
+    """Live view of a scene."""
 
     def view(self, q=None, v=None, *, beside: Any = None, host: str = "127.0.0.1", port: int = 0) -> Any:
-        """The scene in a live viewer: a page with the figure, sliders, effects that are turned on and off and changed while it plays, plots
-        (docs/viewing.md).
+        """Open the scene in a live viewer: a page with the figure, sliders, plots, and effects that can be switched and changed while it
+        plays (docs/viewing.md).
 
         Parameters
         ----------
-        q, v : (nq,), (nv,) or a State, where it begins; the model's own where left out
+        q, v : (nq,), (nv,) or a State, initial state; default: the model's own
         beside : a second scene
-            Drawn as a ghost, which plays with this one; from the same state, if it has the same coordinates.
-        host : the address that is listened at: this machine alone, unless told otherwise
-        port : of that address; 0 is a free one
+            Drawn as a ghost that plays along, from the same state if its coordinates are the same.
+        host : address to listen on; default: this machine only
+        port : port; 0 picks a free one
 
         Returns
         -------
         View
-            A notebook shows it in its cell; `address` is what a browser opens, `close()` ends it. It goes on by `run_options` of the scene
-            ("integrator", "rtol", "atol", "step"), by dopri5 with rtol 1e-7 where they say nothing.
+            A notebook shows it in its cell; open `address` in a browser; `close()` ends it. It uses `run_options` of the scene
+            ("integrator", "rtol", "atol", "step"); default: "auto" with rtol 1e-7.
 
         Raises
         ------
         ModelError
-            A q or v that is none of this model's.
+            A q or v of the wrong size.
         EvaluationError
-            A port that is taken, a host that is none.
+            The port is taken, or the host is not an address of this machine.
 
         Examples
         --------

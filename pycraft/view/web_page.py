@@ -34,7 +34,7 @@ def web_page(name: str, title: str, data: dict[str, Any], texts: dict[str, str],
     policy = f"default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; connect-src {own}"
     body = Template(_text(f"{name}.html")).substitute({"title": escape(title), **texts})
     held = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    scripts = "\n".join(_text(f"{script}.js") for script in ("figure", "camera", "plots", name)).replace('"use strict";\n', "")
+    scripts = "\n".join(_text(f"{script}.js") for script in ("theme", "figure", "camera", "plots", name)).replace('"use strict";\n', "")
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'

@@ -52,7 +52,7 @@ class LiveScene:
         return self.scene if self.pushed is None else self.pushed
 
     def _options(self) -> RunOptions:
-        told = {"integrator": "dopri5", "rtol": 1e-7, "atol": 1e-10, "step": None, **self.scene.run_options}
+        told = {"integrator": "auto", "rtol": 1e-7, "atol": 1e-10, "step": None, **self.scene.run_options}
         integrator, rtol, atol, step = (told[name] for name in OPTIONS)
         normalise = "never" if integrator_named(integrator).foreign else "each step"  # otherwise quaternions would drift within an hour
         return RunOptions.checked(integrator, rtol, atol, step, None, normalise, energy=True)

@@ -106,9 +106,9 @@ def test_refused_rows_say_why():
         (dict(methods=[]), "methods is empty"),
         (dict(refinements=[]), "refinements is empty"),
         (dict(precisions=[]), "precisions is empty"),
-        (dict(seconds=-1), "seconds=-1: a finite number"),
+        (dict(seconds=-1), "seconds=-1: give a finite number"),
         (dict(seconds=np.nan), "seconds=nan"),
-        (dict(seed=-1), "seed=-1: a whole number"),
+        (dict(seed=-1), "seed=-1: give a whole number"),
         (dict(q=np.zeros(5)), "q of 'panda' takes 7 numbers"),
         (dict(q=np.zeros((2, 7)), tau=np.zeros((3, 7))), "batches of 2 and 3 states"),
         (dict(q=np.zeros((0, 7))), "no state given"),
@@ -123,7 +123,7 @@ def test_wrong_arguments(options, words):
 
 
 def test_what_is_no_model():
-    with pytest.raises(TypeError, match=r"accuracy takes a model: pc.load\(path\).*'panda' is none"):
+    with pytest.raises(TypeError, match=r"accuracy takes a model: pc.load\(path\).*got 'panda'"):
         accuracy("panda")
     welded = pc.Multibody("welded", welds="keep")
     welded.add_body("a", hinge="weld", mass=1.0)

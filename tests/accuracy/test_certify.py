@@ -182,7 +182,7 @@ def test_forces_that_cancel_are_data_too():
         (1e-9, {"q": 2e-9, "v": 2e-9, "tau": 3e-9}, None, "only if q, v and tau are exact"),
         (1e-9, {"q": 2e-10, "tau": 0.0}, 2e-9, "within the floor: refinement with this residual may leave as much"),
         (1e-9, {"q": 2e-10, "tau": 0.0}, 1e-10, "nearly as good as its data"),
-        (1e-9, {"q": 1e-16, "tau": 1e-12}, None, "1e+03 times what rounding tau does"),
+        (1e-9, {"q": 1e-16, "tau": 1e-12}, None, "1e+03 times the effect of rounding tau"),
         (1e-9, {"q": 0.0}, None, "changes nothing"),
         (1e-9, {}, None, ""),
     ],
@@ -307,7 +307,7 @@ def test_where_no_rung_is_a_step_up(panda, monkeypatch):
     monkeypatch.setattr(certify, "above", lambda rung: [Rung()])
     certificate = certify_dynamics(model, q, v, tau, seconds=0)
     assert certificate.error > 1e-14 and certificate.next_rung is None
-    assert certificate.notes["next_rung"].startswith("none above halves the error: fast ") and "none above" in repr(certificate)
+    assert certificate.notes["next_rung"].startswith("no rung above halves the error: fast ") and "no rung above" in repr(certificate)
 
 
 def test_a_rung_that_refuses_is_told(monkeypatch):

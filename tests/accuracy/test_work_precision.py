@@ -125,7 +125,7 @@ def resting(t, q, v):
     ("options", "words"),
     [
         (dict(duration=0.0), "duration=0"),
-        (dict(duration=np.inf), "duration=inf: a positive, finite number of seconds"),
+        (dict(duration=np.inf), "duration=inf: give a positive, finite number of seconds"),
         (dict(duration="1"), "duration='1'"),
         (dict(integrators=["euler"]), "integrator 'euler' is not there; there are 'dopri5'.*'scipy:RK45'"),
         (dict(integrators="scipy:RK9"), "integrator 'scipy:RK9' is not there"),
@@ -141,11 +141,11 @@ def resting(t, q, v):
         (dict(q=[0.0, 1.0]), "q of 'pendulum' takes 1 numbers"),
         (dict(q=[[0.0], [1.0]]), "from one state of 'pendulum', not from a batch"),
         (dict(tau=[1.0, 2.0]), "tau of 'pendulum' takes 1 numbers"),
-        (dict(right_hand_side=3), "right_hand_side: a function is called, not 3"),
+        (dict(right_hand_side=3), "right_hand_side must be a function, not 3"),
         (dict(right_hand_side=lambda t, q, v: np.zeros(2)), r"right_hand_side\(0, q, v\) has shape \(2,\)"),
         (dict(right_hand_side=lambda t, q, v: np.array([np.nan])), "is nan at coordinate 'bob'"),
         (dict(energy=lambda q, v: np.nan), "energy.* is nan at the initial state"),
-        (dict(energy=1.0), "energy: a function is called, not 1.0"),
+        (dict(energy=1.0), "energy must be a function, not 1.0"),
     ],
 )
 def test_wrong_arguments(options, words):
@@ -167,7 +167,7 @@ def test_energy_that_is_lost_on_the_way_is_told():
         pendulum(), [0.0], duration=0.2, energy=lambda q, v: next(energies), integrators="dopri5", tolerances=1e-4, seconds=0
     )
     assert len(table) == 1 and "energy(q, v) is nan along the motion" in table[0]["refused"]
-    with pytest.raises(ValueError, match="every one is refused"):
+    with pytest.raises(ValueError, match="every row is refused"):
         table.fastest(1)
 
 

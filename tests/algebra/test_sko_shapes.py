@@ -42,10 +42,10 @@ def put(blocks, k, block):
         (dict(J=put(J, 1, 1.0)), r"J of body 'twig' has the shape \(\)"),
         (dict(parents=[-1, 2, 0]), "body 1 of 'SKO model' has parent 2"),
         (dict(parents="abc"), "parents of 'SKO model' must be a list, not 'abc'"),
-        (dict(parents=[-1, 0.0, 1]), "parents of 'SKO model': a whole number, not 0.0"),
-        (dict(names=["a", "a", "b"]), "names of 'SKO model': 3 different texts"),
+        (dict(parents=[-1, 0.0, 1]), "parents of 'SKO model' must be a whole number, not 0.0"),
+        (dict(names=["a", "a", "b"]), "names of 'SKO model' must be 3 different strings"),
         (dict(names=["a"]), "names of 'SKO model': 1 for 3 bodies"),
-        (dict(H=3), "H of 'SKO model': a list with one block per body"),
+        (dict(H=3), "H of 'SKO model' must be a list with one block per body"),
     ],
 )  # fmt: skip
 def test_blocks_that_do_not_fit(changes, says):

@@ -77,7 +77,7 @@ def test_a_robot_with_effects(here):
     effects = ["gravity", "damping:0.1", "spring:2, rest=0.1, hinges=panda_joint[12], name=coil"]
     output = run("panda", *(word for effect in effects for word in ("--effect", effect)), "-T", "0.2", "--plot")
     lines = [line for line in output.splitlines() if not line.startswith("warning: ")]
-    assert "warning: coordinates of 'panda' left their limits, which no effect of this scene holds: panda_joint4 reached" in output
+    assert "warning: coordinates of 'panda' left their limits, and no effect of this scene holds them: panda_joint4 reached" in output
     assert lines[:4] == [
         "scene of 'panda'", "  on  gravity: Gravity(g=(0.0, 0.0, -9.81))", "  on  damping: Damping(coefficient=0.1)",
         "  on  coil: Spring(stiffness=2, rest=0.1, hinges='panda_joint[12]')",
@@ -130,14 +130,14 @@ def test_effects_in_one_line():
     ("effect", "text"),
     [
         ("dampnig:0.1", "--effect dampnig:0.1: no effect is called 'dampnig'; did you mean 'damping'?"),
-        ("damping", "--effect damping: effect 'damping' (Damping) has no coefficient; give it one: coefficient = ..."),
+        ("damping", "--effect damping: effect 'damping' (Damping) needs coefficient; write coefficient = ..."),
         ("damping:much", "--effect damping:much, coefficient: effect 'damping': damping: coefficient is not an array of numbers"),
-        ("damping:1,2,3", "--effect damping:1,2,3: damping has 2 parameters, coefficient, hinges; '3' is one more"),
-        ("damping:coefficient=1,panda_joint1", "'panda_joint1' has no name and stands behind one that has; write hinges=panda_joint1"),
+        ("damping:1,2,3", "--effect damping:1,2,3: damping has only 2 parameters, coefficient, hinges; remove '3'"),
+        ("damping:coefficient=1,panda_joint1", "'panda_joint1' has no name but follows a named parameter; write hinges=panda_joint1"),
         ("damping:1,coefficient=2", "--effect damping:1,coefficient=2: coefficient is given twice"),
         ("damping:1,hinge=x", "effect 'damping' (Damping) has no key 'hinge'; did you mean 'hinges'?"),
         ("spring:1,hinges=panda_jiont4", "spring: no hinge or coordinate of 'panda' is called 'panda_jiont4'; did you mean 'panda_joint4'"),
-        ("sampled:1", "effect 'sampled' calls a function of Python's, which no file holds"),
+        ("sampled:1", "effect 'sampled' calls a Python function, which a file cannot hold"),
     ],
 )
 def test_effects_that_are_refused(effect, text):

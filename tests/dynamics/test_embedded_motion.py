@@ -150,7 +150,7 @@ def test_refusals():
     with pytest.raises(pc.ModelError, match="of a model, not of None"):
         embedded_motion(None, two)
     for wrong in ([1.0, 0.0], [], [0.0, np.nan], 3.0, [[0.0, 1.0]]):
-        with pytest.raises(pc.EvaluationError, match="times: finite, increasing"):
+        with pytest.raises(pc.EvaluationError, match="times must be finite and increasing"):
             embedded_motion(model, wrong)
     for name, wrong in (("rtol", -1.0), ("atol", np.nan), ("rtol", "x"), ("atol", None), ("rtol", 1e-30)):
         with pytest.raises(pc.Error, match=name):

@@ -360,7 +360,7 @@ def test_refusals():
     for options, message in [
         (dict(bodies="hand"), "hand"),
         (dict(viscous="elbow"), "elbow"),
-        (dict(noise=-1.0), "noise: a positive standard deviation"),
+        (dict(noise=-1.0), "noise must be a positive standard deviation"),
         (dict(noise=[1, 2, 3]), "one for each of 2 coordinates"),
     ]:
         with pytest.raises(pc.ModelError, match=message):

@@ -293,7 +293,7 @@ def test_gravity_and_forces_are_felt():
         (dict(times=[0, 1, 1]), "times: entry 2 is 1 s after 1 s; times are strictly increasing, or strictly decreasing"),
         (dict(times=[0, 1, 0.5]), "strictly increasing, or strictly decreasing"),
         (dict(times=[0, 1, 0.5], integrator="scipy:RK45"), "strictly increasing, or strictly decreasing"),
-        (dict(times=[]), "times: a list of times"),
+        (dict(times=[]), "times must be a list of times"),
         (dict(times=[0, np.inf]), "times: entry 1 is inf"),
         (dict(times=[0, np.inf], integrator="scipy:RK45"), "times: entry 1 is inf"),
         (dict(rtol=np.nan, integrator="scipy:RK45"), "rtol=nan: a tolerance is a positive number"),

@@ -149,7 +149,7 @@ def test_numbers_of_an_integration_and_poses_of_copies():
             pc.Multibody.from_description(given)
     with pytest.raises(pc.ModelError, match="a set of operators is named by a string"):
         arm.soa(None)
-    with pytest.raises(pc.ModelError, match="batch: a number of states, from 0 to"):
+    with pytest.raises(pc.ModelError, match="batch must be a number of states from 0 to"):
         arm.neutral(10**30)
 
 

@@ -111,7 +111,7 @@ def test_refusals():
     for q in ("bent", {}, [1j, 0]):
         with pytest.raises(pc.ModelError, match="q is "):
             model.equipartition(q)
-    with pytest.raises(pc.ModelError, match="seed: a whole number, not 'dice'"):
+    with pytest.raises(pc.ModelError, match="seed must be a whole number, not 'dice'"):
         model.equipartition([0, 0], rng="dice")
     for call in (model.equipartition, model.fixman_potential, model.fixman_torque):
         with pytest.raises(pc.EvaluationError, match=r"temperature=1e\+200 by boltzmann=1e\+200 is inf J: take other units"):

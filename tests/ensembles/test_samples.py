@@ -71,7 +71,7 @@ def test_two_together():
         ),
         (lambda: pc.samples.random(3, {"a": "x"}), "range of 'a': .*a frozen distribution of scipy.stats, not 'x'"),
         (lambda: pc.samples.random(3, {"a": (0, np.inf)}), "two finite numbers"),
-        (lambda: pc.samples.sobol(4, {"a": (0, 1)}, seed=-1), "seed: a whole number from 0 on"),
+        (lambda: pc.samples.sobol(4, {"a": (0, 1)}, seed=-1), "seed must be a whole number from 0 on"),
     ],
 )
 def test_what_makes_no_sense_is_refused(call, text):

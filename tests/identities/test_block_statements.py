@@ -121,7 +121,7 @@ ERRORS = [
     ("Ω(k) = Υ(k)", "has blocks between two bodies", None),
     ("V(i,j) = V(i)", "blocks have one body", None),
     ("D(k)² = D(k)", "of blocks there are", None),
-    ("φ(i,j) = 0, i above j and j above i", "no bodies are as it says", None),
+    ("φ(i,j) = 0, i above j and j above i", "satisfy its relations", None),
 ]
 
 

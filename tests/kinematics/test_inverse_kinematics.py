@@ -347,7 +347,7 @@ def test_neutral():
     model = pc.tree([-1, 0, 1], ["free", "ball", "pin"])
     assert model.neutral().tolist() == [1, *[0] * 6, 1, 0, 0, 0, 0]
     assert model.neutral(3).shape == (3, 12) and model.neutral(0).shape == (0, 12)
-    with pytest.raises(pc.ModelError, match="batch: a number of states, from 0 to 2147483647, not -1"):
+    with pytest.raises(pc.ModelError, match="batch must be a number of states from 0 to 2147483647, not -1"):
         model.neutral(-1)
 
 

@@ -185,7 +185,7 @@ def test_modes_as_text_and_pictures(monkeypatch):
     mpl.pyplot.close("all")
     with pytest.raises(pc.EvaluationError, match="there is no mode 5; the model has 2"):
         modes.plot(5)
-    with pytest.raises(pc.ModelError, match="mode: a whole number, not 'first'"):
+    with pytest.raises(pc.ModelError, match="mode must be a whole number, not 'first'"):
         modes.plot("first")
     with pytest.raises(pc.ModelError, match="amplitude is not an array of numbers"):
         modes.plot(0, amplitude="wide")

@@ -298,10 +298,10 @@ def test_descriptions_are_checked():
     [
         (lambda: pc.tree([-1, 1], "pin"), "body 1 of a tree has parent 1; parents come before their children"),
         (lambda: pc.tree([-1, -2], "pin"), "body 1 of a tree has parent -2"),
-        (lambda: pc.chain(2, seed=-1), "seed: a whole number from 0 on, or a numpy.random.Generator, not -1"),
-        (lambda: pc.chain(2, seed=True), "seed: a whole number, not True"),
-        (lambda: pc.chain(True), "the number of bodies of a chain: a whole number, not True"),
-        (lambda: pc.chain(2.0), "the number of bodies of a chain: a whole number, not 2.0"),
+        (lambda: pc.chain(2, seed=-1), "seed must be a whole number from 0 on, or a numpy.random.Generator, not -1"),
+        (lambda: pc.chain(2, seed=True), "seed must be a whole number, not True"),
+        (lambda: pc.chain(True), "the number of bodies of a chain must be a whole number, not True"),
+        (lambda: pc.chain(2.0), "the number of bodies of a chain must be a whole number, not 2.0"),
         (lambda: pc.chain(2, mass=[1.0]), "mass of a rod takes one number, not an array"),
     ],
 )

@@ -167,12 +167,12 @@ def test_velocities_that_conflict_are_named():
         (dict(q0=[0.0]), r"q of 'four-bar'"),
         (dict(fix="piston"), r"no hinge or coordinate of 'four-bar' is called 'piston'"),
         (dict(fix={"crank": 0.4}), r"named by a list, without values, which are those of a state: \['crank'\], not \{'crank': 0.4\}"),
-        (dict(starts=0), r"starts: the number of starting states, at least 1, not 0"),
-        (dict(starts=1.5), r"starts: a whole number"),
-        (dict(tolerance=0), r"tolerance: a positive number, not 0"),
-        (dict(tolerance=np.nan), r"tolerance: a positive number"),
-        (dict(tolerance=np.inf), r"tolerance: a positive number, not inf"),
-        (dict(seed="x"), r"seed: a whole number"),
+        (dict(starts=0), r"starts must be at least 1 \(the number of starting states\), not 0"),
+        (dict(starts=1.5), r"starts must be a whole number"),
+        (dict(tolerance=0), r"tolerance must be a positive number, not 0"),
+        (dict(tolerance=np.nan), r"tolerance must be a positive number"),
+        (dict(tolerance=np.inf), r"tolerance must be a positive number, not inf"),
+        (dict(seed="x"), r"seed must be a whole number"),
     ],
 )
 def test_arguments_that_are_none(given, said):
@@ -311,5 +311,5 @@ def test_velocities_that_are_no_numbers(call):
 
 @pytest.mark.parametrize("tolerance", [np.nan, -1.0, 0.0, 1.0])
 def test_the_tolerance_of_mobility(tolerance):
-    with pytest.raises(pc.ModelError, match="tolerance: between 0 and 1"):
+    with pytest.raises(pc.ModelError, match="tolerance must be between 0 and 1"):
         pc.chain(2).mobility(tolerance=tolerance)

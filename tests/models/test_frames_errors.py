@@ -230,8 +230,8 @@ def test_coordinates_that_are_not_there(arm):
         ([3], "coordinate 3 of 'chain of 3 rods', which has 3"),
         ([-1], "coordinate -1 of 'chain of 3 rods', which has 3"),
         (["hinge0", 0], "coordinate 'hinge0' of 'chain of 3 rods' is named twice"),
-        ([1.0], "a coordinate of 'chain of 3 rods': a whole number, not 1.0"),
-        (2.5, "a coordinate of 'chain of 3 rods': a whole number, not 2.5"),
+        ([1.0], "a coordinate of 'chain of 3 rods' must be a whole number, not 1.0"),
+        (2.5, "a coordinate of 'chain of 3 rods' must be a whole number, not 2.5"),
     ]:
         with refused(pc.ModelError, words):
             frame.jacobian(coordinates=given)

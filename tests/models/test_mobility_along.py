@@ -91,7 +91,7 @@ def test_refused(q, said):
 
 
 def test_tolerance_of_the_search_is_one_of_singular_values():
-    with pytest.raises(pc.ModelError, match="tolerance: between 0 and 1"):
+    with pytest.raises(pc.ModelError, match="tolerance must be between 0 and 1"):
         four_bar(1.0, 1.0, 1.0, 1.0).mobility_along([[0.0, 0.0, np.pi]], tolerance=2.0)
 
 
@@ -131,7 +131,7 @@ def test_batches_of_assemblies_are_their_states():
 def test_what_is_no_coordinate_is_told_of_no_state(count):
     with pytest.raises(pc.ModelError, match="^no hinge or coordinate of 'four-bar' is called 'piston'"):
         four_bar(1.0, 1.0, 1.0, 1.0).assemble(np.zeros((count, 3)), fix="piston")
-    with pytest.raises(pc.ModelError, match="^tolerance: a positive number"):
+    with pytest.raises(pc.ModelError, match="^tolerance must be a positive number"):
         four_bar(1.0, 1.0, 1.0, 1.0).assemble(np.zeros((count, 3)), tolerance=-1)
 
 

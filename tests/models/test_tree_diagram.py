@@ -120,5 +120,5 @@ def test_small_ones():
     model.add_body("line\nbreak", mass=1)
     assert shown(model) == ["one: 1 body, 1 degree of freedom", "base", "└─ line\\nbreak  pin  q[0]"]
     assert repr(model.tree()) == str(model.tree())
-    with pytest.raises(pc.ModelError, match="the most lines of a tree: a whole number, not 2.5"):
+    with pytest.raises(pc.ModelError, match="the most lines of a tree must be a whole number, not 2.5"):
         model.tree(2.5)

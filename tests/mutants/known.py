@@ -236,6 +236,10 @@ AREAS = {
     "pycraft/identities/block_reading.py": ["identities/test_block_statements.py"],
     "pycraft/identities/block_relations.py": ["identities/test_block_statements.py"],
     "pycraft/identities/block_values.py": ["identities/test_block_statements.py"],
+    "pycraft/identities/extended_numbers.py": ["identities/test_block_statements.py", "identities/test_inequalities.py"],
+    "pycraft/identities/inequalities.py": ["identities/test_inequalities.py"],
+    "pycraft/identities/part_letters.py": ["identities/test_letters_of_parts.py", "identities/test_catalogue_typed.py"],
+    "pycraft/identities/on_loops.py": ["identities/test_letters_of_parts.py"],
     "pycraft/proofs/worksheet.py": ["proofs/test_worksheet.py", "proofs/test_exercise.py"],
     "pycraft/proofs/presuppositions.py": ["proofs/test_prove_presuppositions.py", "proofs/test_prove_assumptions.py"],
     "pycraft/proofs/relations.py": [

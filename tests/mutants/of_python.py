@@ -173,7 +173,8 @@ CHANGES = {
         ("rows are blocks", '(kind(name) == "blocks" or last and kind(name) == "vector")', "True"),
     ],
     "pycraft/identities/standard_letters.py": [
-        ("forces without rotors", '"H f + J vdot"', '"H f"'),
+        ("forces without rotors", '"H f + J vdot + b_J"', '"H f + b_J"'),
+        ("forces without what rotors gyrate", '"H f + J vdot + b_J"', '"H f + J vdot"'),
         ("a Coriolis matrix without its transposed half", "momentum_cross + V_bar M + M V_tilde", "momentum_cross"),
     ],
     "pycraft/identities/truth.py": [
@@ -207,7 +208,18 @@ CHANGES = {
         ("a block's transpose is the block", "Block(x.array.T, _dual(x.domain)", "Block(x.array, _dual(x.domain)"),
         ("children are all bodies", "[k for k, p in enumerate(parents) if p == of]", "[*range(len(parents))]"),
         ("determinants without signs", "pivots.append(work[k, k] if row == k else -work[k, k])", "pivots.append(work[k, k])"),
+    ],
+    "pycraft/identities/extended_numbers.py": [
         ("extended numbers are doubles", "high.astype(np.longdouble) + low.astype(np.longdouble)", "high.astype(np.longdouble)"),
+    ],
+    "pycraft/identities/inequalities.py": [
+        ("what is zero is positive", "return FAILS if strict else HOLDS", "return HOLDS"),
+        (
+            "the order of the sides does not matter",
+            'if read.relation in (">", "≥") else (read.rhs, read.lhs)',
+            "if read.relation else (read.rhs, read.lhs)",
+        ),
+        ("asymmetric differences are compared", "if _largest(matrix - matrix.T) > max(2 * bound, 1e-9 * scale):", "if False:"),
     ],
     "pycraft/identities/block_check.py": [
         (

@@ -130,8 +130,8 @@ def test_the_front_and_what_noise_hides():
     [
         (lambda s: s.compare("gravty"), "the scene of 'slider' has no effect 'gravty'; did you mean 'gravity'?"),
         (lambda s: s.disable("push").compare(["push"]), "effect 'push' is off already; enable it to see what leaving it out does"),
-        (lambda s: s.compare([]), "without is empty: nothing to compare; leave it out for every effect that is on"),
-        (lambda s: s.compare([()]), "without: a set of no effects; the scene with everything is a row of its own"),
+        (lambda s: s.compare([]), "without is empty: name effects, or leave it out to compare every effect that is on"),
+        (lambda s: s.compare([()]), "without contains an empty set of effects; the whole scene always has its own row"),
         (lambda s: s.compare(T=-1.0), "T=-1: a run lasts a positive number of seconds"),
         (lambda s: s.needed(0.0), "tolerance: 0.0 is not a positive, finite tolerance"),
         (lambda s: s.needed("small"), "tolerance: 'small' is not a positive, finite tolerance"),

@@ -90,7 +90,7 @@ def test_every_precision(arm, precision):
     scene = pc.Scene(arm, precision=precision).add(E.Gravity(), E.Prescribed("panda_joint2", 0.3), E.Damping(1.0))
     table = scene.cost(seconds=0, integrator="rk4", step=0.01)
     assert all(row["seconds"] >= 0 for row in table.of("pass")) and f", {precision}, over 5 states" in table.title
-    assert table.of("integrator")[0]["because"] == "4 evaluations a step"
+    assert table.of("integrator")[0]["because"] == "4 evaluations per step"
 
 
 def test_wider_numbers_cost_more(arm):
@@ -118,9 +118,9 @@ def test_states_are_those_given(arm):
     ("given", "text"),
     [
         ({"v": np.zeros(7)}, "v is given without q; give both, or neither for random states"),
-        ({"q": np.zeros((0, 7))}, "no state given: q of 'panda' has no rows"),
+        ({"q": np.zeros((0, 7))}, "no state given: q for 'panda' has no rows"),
         ({"q": np.zeros(6)}, "q"),
-        ({"seconds": -1}, "seconds=-1: a finite number of seconds, zero or more"),
+        ({"seconds": -1}, "seconds=-1: give a finite number of seconds, zero or more"),
         ({"integrator": "rk5"}, "no integrator is called 'rk5'"),
     ],
 )
@@ -143,7 +143,7 @@ ROWS = [
     ("poses", "pass", 3e-7, "wrench", ""),
     ("accelerations", "pass", 5e-7, "gravity", ""),
     ("calls, forces cleared", "between", 2e-8, "", ""),
-    ("dopri5", "integrator", 1.8e-7, "7 evaluations a step", ""),
+    ("dopri5", "integrator", 1.8e-7, "7 evaluations per step", ""),
     ("a step, for each evaluation", "step", 1e-6, "", ""),
     ("gravity", "on", -1e-9, "", ""),
     ("wrench", "on", 3.2e-7, "", ""),
@@ -170,7 +170,9 @@ def test_as_text_html_and_files(tmp_path, monkeypatch):
     assert (tmp_path / "cost.csv").read_text().splitlines()[1] == "poses,pass,3e-07,0.3,wrench,"
     monkeypatch.setenv("COLUMNS", "70")
     narrow = repr(table)
-    assert max(map(len, narrow.splitlines())) <= 70 and "500 ns" in narrow and "7 evaluations a step" in narrow and "refused: it" in narrow
+    assert (
+        max(map(len, narrow.splitlines())) <= 70 and "500 ns" in narrow and "7 evaluations per step" in narrow and "refused: it" in narrow
+    )
 
 
 def test_picture():
@@ -178,7 +180,7 @@ def test_picture():
     upper, lower = written([*ROWS, ("drag", "off", 1e-7, "", "")]).plot()
     assert [bar.get_width() for bar in upper.patches] == [3e-7, 5e-7, 2e-8, 1.8e-7]
     assert [label.get_text() for label in upper.get_yticklabels()][:2] == ["poses  (wrench)", "accelerations  (gravity)"]
-    assert "1 µs of a step for each evaluation" in upper.get_title(loc="left")
+    assert "1 µs of a step per evaluation" in upper.get_title(loc="left")
     assert [bar.get_width() for bar in lower.patches] == [0.0, 3.2e-7, 1e-7]
     assert [bar.get_facecolor() == (1, 1, 1, 1) for bar in lower.patches] == [False, False, True]
     assert [text.get_text() for text in lower.texts] == ["< 4 ns", "320 ns, 32 %", "100 ns, 10 %"]

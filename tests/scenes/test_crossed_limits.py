@@ -22,7 +22,9 @@ def sliders(*limits):
 
 def test_each_coordinate_that_left_its_limits_is_named():
     scene = pc.Scene(sliders((-1, 1), (-1, 1), None, (-10, 10)))
-    with pytest.warns(ModelWarning, match=r"coordinates of 'sliders' left their limits, which no effect of this scene holds: s0 reached 3"):
+    with pytest.warns(
+        ModelWarning, match=r"coordinates of 'sliders' left their limits, and no effect of this scene holds them: s0 reached 3"
+    ):
         run = scene.simulate(3.0, np.zeros(4), [1.0, -0.5, 9.0, 0.1], t_eval=np.linspace(0, 3, 31), max_step=0.1, **QUIET)
     first, second = run.crossed_limits
     assert (first.coordinate, first.limit, first.upper) == ("s0", 1.0, True)

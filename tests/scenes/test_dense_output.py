@@ -110,17 +110,17 @@ def test_of_a_run_that_was_pickled():
     times = np.linspace(0, 0.5, 41)
     assert np.abs(again.at(times).q - run.at(times).q).max() < 1e-6
     assert again.checkpoint() == run.checkpoint() and again.statistics == run.statistics
-    with pytest.raises(pc.EvaluationError, match="no scene behind it"):
+    with pytest.raises(pc.EvaluationError, match="this motion has no scene"):
         print(again.at(0.2).vdot)
 
 
 def test_what_is_not_there():
     run = pc.mechanisms.pendulum().simulate(1.0, t_eval=[0.5, 1.0], dense=False)
-    with pytest.raises(pc.EvaluationError, match="kept the times of t_eval alone; simulate with dense=True"):
+    with pytest.raises(pc.EvaluationError, match="kept only the times of t_eval; simulate with dense=True"):
         run.at(0.7)
     run = pc.mechanisms.pendulum().simulate(1.0)
     for t in (-0.1, 1.2, np.nan):
-        with pytest.raises(pc.EvaluationError, match=f"t = {t:g} s is not in the run, which goes from 0 to 1 s"):
+        with pytest.raises(pc.EvaluationError, match=f"t = {t:g} s is outside the run, which lasts from 0 to 1 s"):
             run.at(t)
 
 

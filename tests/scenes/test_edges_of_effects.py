@@ -81,7 +81,7 @@ def test_refusals():
     model = pc.chain(2)
     with pytest.raises(pc.EvaluationError, match="linearized in double precision, and this one computes in 'quad'"):
         pc.Scene(model, precision="quad").quadratic_model()
-    with pytest.raises(pc.EvaluationError, match="keeps loops, of which quadratic models are not made"):
+    with pytest.raises(pc.EvaluationError, match="keeps loops, which quadratic models do not support"):
         pc.mechanisms.n_four_bar().quadratic_model()
     with pytest.raises(pc.ModelError, match="inputs: no hinge or coordinate"):
         pc.Scene(model).quadratic_model(inputs="elbow")

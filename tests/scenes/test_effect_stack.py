@@ -48,7 +48,7 @@ def test_more_than_the_whole_more_than_the_colours_and_refusals():
     assert max(p.get_x() + p.get_width() for p in costs.patches) == pytest.approx(180) and costs.get_xlim()[1] > 180
     styles = [(p.get_facecolor(), p.get_hatch()) for i, p in sorted(bars(costs).items())]
     assert len(set(styles)) == 9 > len(COLOURS)
-    assert "  refused" in [t.get_text() for t in costs.texts] and "not without it" in [t.get_text() for t in changes.texts]
+    assert "  refused" in [t.get_text() for t in costs.texts] and "does not run without it" in [t.get_text() for t in changes.texts]
 
 
 def test_what_is_not_resolved_is_hollow_and_nothing_is_an_empty_frame():

@@ -115,7 +115,7 @@ def test_numbers_one_by_one_are_not_given_to_other_coordinates(made):
     star.reattach("body1", "body3", "pin", placement="here")
     assert star.coordinate_names == ["hinge0", "hinge2", "hinge3", "hinge1"]
     words = (
-        "effect 'it' .* for the coordinates hinge0, hinge1, hinge2, hinge3; .* hinge0, hinge2, hinge3, hinge1: remove it, and add it anew"
+        "effect 'it' .* for the coordinates hinge0, hinge1, hinge2, hinge3; .* hinge0, hinge2, hinge3, hinge1: remove it, and add it again"
     )
     for _ in range(2):
         with pytest.raises(pc.ModelError, match=words):

@@ -134,5 +134,5 @@ def test_works_change_no_step(model):
     for options in (dict(), dict(integrator="bulirsch-stoer"), dict(integrator="rkmk4", step=0.01)):
         counted, plain = (scene.simulate(0.3, state.q, state.v, energy=energy, **options) for energy in (True, False))
         assert np.array_equal(counted.t, plain.t) and np.array_equal(counted.q, plain.q) and np.array_equal(counted.v, plain.v)
-        with pytest.raises(pc.EvaluationError, match="kept no account of works; simulate with energy=True"):
+        with pytest.raises(pc.EvaluationError, match="did not record works; simulate with energy=True"):
             print(plain.energy)

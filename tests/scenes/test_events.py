@@ -127,12 +127,12 @@ def test_controllers_and_events():
         (lambda t, s: None, "event 'lambda' gives NoneType at t = 0 s; it is one number"),
         (lambda t, s: "high", "event 'lambda' gives str at t = 0 s; it is one number"),
         (lambda t, s: np.nan if t > 0.05 else 1.0, r"event 'lambda' is nan at t = 0\.\d+ s"),
-        (3.0, "events: an event is a function .*, not 3.0"),
-        ([3.0], "events: an event is a function"),
+        (3.0, "events: an event must be a function .*, not 3.0"),
+        ([3.0], "events: an event must be a function"),
         ([pc.Event(lambda t, s: 1.0, direction=[1])], r"events: direction=\[1\]; there are 0, 1, -1, 'both', 'rising' and 'falling'"),
         ([pc.Event(lambda t, s: 1.0, direction=None)], "events: direction=None; there are 0, 1, -1, 'both', 'rising' and 'falling'"),
         ([pc.Event(lambda t, s: 1.0, direction=2)], "events: direction=2; there are 0, 1, -1, 'both', 'rising' and 'falling'"),
-        ([pc.Event(lambda t, s: 1.0, name="a"), pc.Event(lambda t, s: 1.0, name="a")], "events: two are called 'a'"),
+        ([pc.Event(lambda t, s: 1.0, name="a"), pc.Event(lambda t, s: 1.0, name="a")], "events: two events are called 'a'"),
     ],
 )
 def test_what_is_no_event(given, text):

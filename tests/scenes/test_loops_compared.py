@@ -133,7 +133,7 @@ def test_refusals():
             pc.loops_compared(M.slider_crank() if scene is None else scene, **given)
 
     model = M.slider_crank().model
-    says("loops are compared of a scene", model, pc.ModelError)
+    says("loops_compared takes a scene", model, pc.ModelError)
     says("keeps no loops: add effects.Loop()", pc.Scene(model), pc.ModelError)
     says("keeps no loops", pc.Scene(model).add(E.Loop(method="penalty", frequency=10.0)), pc.ModelError)
     says("method 'springs' is not there", methods="springs")

@@ -62,9 +62,9 @@ def test_furutas_pendulum_is_unstable_upright():
 @pytest.mark.parametrize(
     "make, text",
     [
-        (lambda: pc.mechanisms.pendulum(length=0.0), "length=0.0: a positive number"),
-        (lambda: pc.mechanisms.double_pendulum(masses=(1.0, -1.0)), "masses=-1.0: a positive number"),
-        (lambda: pc.mechanisms.kepler(eccentricity=1.0), "eccentricity=1.0: an ellipse's is from 0 to below 1"),
+        (lambda: pc.mechanisms.pendulum(length=0.0), "length=0.0: give a positive number"),
+        (lambda: pc.mechanisms.double_pendulum(masses=(1.0, -1.0)), "masses=-1.0: give a positive number"),
+        (lambda: pc.mechanisms.kepler(eccentricity=1.0), "eccentricity=1.0: give at least 0 and less than 1"),
     ],
 )
 def test_numbers_that_make_no_sense(make, text):

@@ -59,8 +59,8 @@ def test_of_files_and_edits():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (dict(dissipation=1.0, restitution=(0.5, 1.0)), "in two ways; give one of them"),
-        (dict(restitution=0.5), r"a pair \(e, v\), a coefficient and the speed where it holds, not 0.5"),
+        (dict(dissipation=1.0, restitution=(0.5, 1.0)), "give either dissipation or restitution"),
+        (dict(restitution=0.5), r"a pair \(e, v\), a coefficient and the speed at which it holds, not 0.5"),
         (dict(restitution=(0.5,)), r"a pair \(e, v\)"),
         (dict(restitution=(0.0, 1.0)), "above 0 and no more than 1, not 0"),
         (dict(restitution=(1.1, 1.0)), "above 0 and no more than 1, not 1.1"),

@@ -93,9 +93,13 @@ def test_in_axes_of_ones_own(run):
 @pytest.mark.parametrize(
     "options, error, text",
     [
-        (dict(fps=0), pc.EvaluationError, "fps=0: a positive number"),
-        (dict(speed=-1.0), pc.EvaluationError, "speed=-1: a positive number"),
-        (dict(speed=1e-3), pc.EvaluationError, r"at fps=25 and speed=0\.001 are 10001 frames, and 2000 at most are drawn; speed=0\.005 or"),
+        (dict(fps=0), pc.EvaluationError, "fps=0: give a positive number"),
+        (dict(speed=-1.0), pc.EvaluationError, "speed=-1: give a positive number"),
+        (
+            dict(speed=1e-3),
+            pc.EvaluationError,
+            r"at fps=25 and speed=0\.001 are 10001 frames; at most 2000 can be drawn; use speed=0\.005 or",
+        ),
         (dict(view="front"), pc.EvaluationError, "view='front': there are 'auto'"),
         (dict(output="run.avi"), pc.EvaluationError, r"output 'run.avi': a film is written to a file that ends in \.html, \.gif, \.mp4"),
     ],

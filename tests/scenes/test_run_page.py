@@ -136,10 +136,10 @@ def test_names_are_no_markup():
 def test_refusals(run, tmp_path):
     for arguments, options, words in (
         (("run.gif",), {}, "ends in .html"),
-        ((), {"fps": 0}, "fps=0: a positive number"),
-        ((), {"speed": float("inf")}, "speed=inf: a positive number"),
-        ((), {"fps": 1e6}, "100 at most go into a page; a lower fps"),
-        ((None, "voltage"), {}, "no picture is called 'voltage'"),
+        ((), {"fps": 0}, "fps=0: give a positive number"),
+        ((), {"speed": float("inf")}, "speed=inf: give a positive number"),
+        ((), {"fps": 1e6}, "a page holds at most 100 MB: use a lower fps"),
+        ((None, "voltage"), {}, "no plot is called 'voltage'"),
     ):
         with pytest.raises(pc.EvaluationError, match=re.escape(words)):
             run.to_html(*arguments, **options)
@@ -174,6 +174,23 @@ def test_it_plays(browser, film, dark, tmp_path):
         assert page.inner_text("#now") == "t = 2.00 s"
         page.screenshot(path=tmp_path / "end.png")
         assert page.asked == [film.as_uri()]  # nothing but itself
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_a_page_in_a_cell_has_the_theme_of_its_notebook(browser, run, tmp_path, dark):
+    """JupyterLab's body has its theme, which a page takes, also against the system's mode, and again when it changes."""
+    cell = tmp_path / "cell.html"
+    body = f"<body data-jp-theme-light='{str(not dark).lower()}'>{run.to_html()._repr_html_()}</body>"
+    cell.write_text(f"<!DOCTYPE html><html lang='en'><meta charset='utf-8'><link rel='icon' href='data:,'>{body}</html>", encoding="utf-8")
+    colours = {True: ["rgb(27, 27, 29)", "#1b1b1d"], False: ["rgb(255, 255, 255)", "#ffffff"]}
+    with opened(browser, cell.as_uri(), dark=not dark) as page:
+        (frame,) = page.frames[1:]
+        frame.wait_for_selector("#figure")
+        seen = "[getComputedStyle(document.body).backgroundColor, colourOf('--page')]"
+        assert frame.evaluate(seen) == colours[dark]
+        page.evaluate(f"document.body.dataset.jpThemeLight = '{str(dark).lower()}'")
+        frame.wait_for_function(f"{seen}[0] === '{colours[not dark][0]}'")
+        assert frame.evaluate(seen) == colours[not dark]
 
 
 def test_the_slider_and_the_plot_choose_the_time(browser, film):

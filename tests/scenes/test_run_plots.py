@@ -35,7 +35,7 @@ def test_what_is_drawn():
 
 def test_a_choice():
     run = pc.mechanisms.cart_pole().simulate(0.5)
-    assert titles(run.plot("q", "balance", coordinates="pivot")) == ["angles", "kinetic + potential - work, less its first value"]
+    assert titles(run.plot("q", "balance", coordinates="pivot")) == ["angles", "kinetic + potential - work, minus its first value"]
     figure = run.plot("q", "vdot")
     assert titles(figure) == ["angles", "travels", "accelerations", "accelerations"] and figure.axes[3].get_ylabel() == "m/s²"
     assert figure.axes[0].lines[0].get_label() == "pivot"
@@ -43,13 +43,11 @@ def test_a_choice():
 
 def test_what_there_is_not():
     run = pc.mechanisms.pendulum().simulate(0.1)
-    with pytest.raises(
-        pc.EvaluationError, match="plot: no picture is called 'x'; there are 'q', 'v', 'vdot', 'energy', 'balance', 'forces'"
-    ):
+    with pytest.raises(pc.EvaluationError, match="plot: no plot is called 'x'; there are 'q', 'v', 'vdot', 'energy', 'balance', 'forces'"):
         run.plot("x")
     with pytest.raises(pc.ModelError, match="plot: no hinge or coordinate of 'pendulum' is called 'bib'; did you mean 'bob'"):
         run.plot(coordinates="bib")
-    with pytest.raises(pc.EvaluationError, match="plot: there is nothing to see of 'forces' in this run"):
+    with pytest.raises(pc.EvaluationError, match="plot: this run has no data for 'forces'"):
         pc.Scene(run.model).simulate(0.1, [0.0], [1.0]).plot("forces")
 
 

@@ -26,7 +26,17 @@ def test_shapes_and_names(run):
     assert list(run.forces) == run.effects == ["gravity", "spring", "damping", "torque_source"]
     assert all(force.shape == (K, model.nv) for force in run.forces.values())
     assert run.workers == ["damping", "torque_source"] and run.energy["work"].shape == (K, 2)
-    assert set(run.statistics) == {"evaluations", "steps", "rejected", "seconds", "linearizations", "solutions", "in_packs", "passes"}
+    assert set(run.statistics) == {
+        "evaluations",
+        "steps",
+        "rejected",
+        "seconds",
+        "linearizations",
+        "solutions",
+        "in_packs",
+        "passes",
+        "switches",
+    }
     assert run.statistics["steps"] == K - 1 and run.statistics["passes"]["accelerations"] == run.statistics["evaluations"]
     assert repr(run) == f"<run of 'spinning': {K} states from 0 to 1 s, {K - 1} steps>" and len(run) == K
 
@@ -87,7 +97,7 @@ def test_frames(run):
 def test_a_run_without_works():
     plain = CASES["damped"]().simulate(0.2, energy=False)
     for what in ("energy", "balance"):
-        with pytest.raises(pc.EvaluationError, match="kept no account of works; simulate with energy=True"):
+        with pytest.raises(pc.EvaluationError, match="did not record works; simulate with energy=True"):
             getattr(plain, what)
 
 
@@ -108,7 +118,7 @@ def test_a_failed_step_says_where_and_hands_over_what_was_computed():
     with pytest.warns(pc.ModelWarning, match="negative"):
         scene = pc.Scene(model).add(E.Damping(-1000.0))
     for options in ({"rtol": 1e-6}, {"integrator": "rk4", "step": 1e-4}, {"integrator": "rosenbrock4", "rtol": 1e-6}):
-        name = options.get("integrator", "dopri5")
+        name = options.get("integrator", "(auto|dopri5)")
         with pytest.raises(pc.EvaluationError, match=rf"integrator '{name}': .* t = 0\.\d+ s.*(coordinate|velocity of) 'bob'") as caught:
             scene.simulate(2.0, [0.0], [1.0], **options)
         run = caught.value.run
@@ -177,13 +187,13 @@ def test_progress_is_shown_in_a_terminal(monkeypatch, capsys):
         (dict(max_step=0.0), "max_step=0.0: a step is a positive number of seconds"),
         (dict(T=0.0), "T=0: a run lasts a positive number of seconds"),
         (dict(T=np.inf), "T=inf: a run lasts"),
-        (dict(t_eval=[0.5, 0.2]), r"t_eval: entry 1 is 0.2 s after 0.5 s; times rise"),
-        (dict(t_eval=[0.5, 2.0]), "t_eval goes from 0.5 to 2 s; the run goes from 0 to T = 1 s"),
+        (dict(t_eval=[0.5, 0.2]), r"t_eval: entry 1 is 0.2 s after 0.5 s; times must rise"),
+        (dict(t_eval=[0.5, 2.0]), "t_eval goes from 0.5 to 2 s; the run lasts from 0 to T = 1 s"),
         (dict(rtol=1e-20, atol=1e-20), "rtol=1e-20 and atol=1e-20 are below what the precision holds"),
         (dict(atol=0.0), "atol is positive"),
         (dict(rtol=np.nan, integrator="DOP853"), "rtol=nan: a tolerance is a positive number"),
         (dict(normalise="always"), "normalise='always': there are 'never' and 'each step'"),
-        (dict(normalise="each step", integrator="DOP853"), "integrator 'scipy:DOP853' has no normalise='each step'"),
+        (dict(normalise="each step", integrator="DOP853"), "integrator 'scipy:DOP853' does not support normalise='each step'"),
         (dict(output="run.txt"), r"output 'run.txt': a run is written to a file that ends in .nc, .parquet, .csv"),
     ],
 )
@@ -219,7 +229,7 @@ def test_of_a_model_that_was_edited_since_nothing_new_follows(what, edit):
     run = scene.simulate(0.2)
     q = run.q.copy()
     EDITS[edit](scene.model)
-    with pytest.raises(pc.StaleOperatorError, match="'double pendulum' was edited since, and this motion is of the model as it was"):
+    with pytest.raises(pc.StaleOperatorError, match="'double pendulum' was edited since this motion was computed"):
         WHAT_FOLLOWS[what](run)
     assert np.array_equal(run.q, q) and len(run.t) == len(run.v) and "double pendulum" in repr(run)
 
@@ -234,7 +244,7 @@ def test_what_was_computed_before_an_edit_stays_also_in_pickles():
         assert np.array_equal(copy.energy["kinetic"], energy)
         with pytest.raises(pc.StaleOperatorError, match="was edited since"):
             copy.momentum  # noqa: B018 - raises
-    with pytest.raises(pc.EvaluationError, match="no scene behind it"):
+    with pytest.raises(pc.EvaluationError, match="this motion has no scene"):
         pickle.loads(pickle.dumps(late)).energy  # noqa: B018 - raises
     fresh = pickle.loads(pickle.dumps(scene.simulate(0.2)))
     assert np.isfinite(fresh.momentum["com"]).all()

@@ -4,6 +4,7 @@ import builtins
 import csv
 import json
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -73,7 +74,7 @@ def test_there_and_back(run, ending, tmp_path):
     again = pc.load_run(tmp_path / f"run.{ending}")
     same(run, again)
     assert np.abs(again.at(0.2).q - run.at(0.2).q).max() < 1e-6
-    with pytest.raises(pc.EvaluationError, match="has no checkpoint; save that of the run itself"):
+    with pytest.raises(pc.EvaluationError, match="has no checkpoint; save the checkpoint of the original run"):
         again.checkpoint()
 
 
@@ -149,7 +150,7 @@ def test_a_path_that_cannot_be_written_is_refused_before_the_run(tmp_path, monke
     run = scene.simulate(0.1, [0.0], [0.0])
     monkeypatch.setattr(builtins, "__import__", without)
     called.clear()
-    with pytest.raises(ImportError, match="Parquet needs pyarrow: pip install 'pycraft-soa.data.'; '.nc' and '.csv' need nothing"):
+    with pytest.raises(ImportError, match="Parquet needs pyarrow: pip install 'pycraft-soa.data.'; '.nc' and '.csv' need no package"):
         scene.simulate(0.1, [0.0], [0.0], output=tmp_path / "run.parquet")
     assert called == []
     with pytest.raises(ImportError, match="needs pandas: pip install 'pycraft-soa.data.'"):
@@ -167,7 +168,7 @@ def test_files_that_hold_no_run(tmp_path):
     for name in ("text.nc", "other.nc"):
         with pytest.raises(pc.EvaluationError, match=f"{name}' holds no run"):
             pc.load_run(tmp_path / name)
-    with pytest.raises(pc.EvaluationError, match="runs are read from files that end in .nc and .parquet"):
+    with pytest.raises(pc.EvaluationError, match="a run can be read from files that end in .nc and .parquet"):
         pc.load_run("run.csv")
     with pytest.raises(FileNotFoundError, match="there is no file 'none.nc'"):
         pc.load_run("none.nc")
@@ -258,5 +259,37 @@ def test_files_of_the_first_format(t_eval, tmp_path):
         newer.createDimension("time", 1)
         newer.createVariable("time", "d", ("time",))[:] = 0.0
         newer.createVariable("kinetic", "d", ("time",))[:] = 0.0
-    with pytest.raises(pc.EvaluationError, match="its format is 'pycraft run 3', not 'pycraft run 1' or 'pycraft run 2'"):
+    with pytest.raises(pc.EvaluationError, match="the format 'pycraft run 3'; this version reads 'pycraft run 1' or 'pycraft run 2'"):
         pc.load_run(tmp_path / "newer.nc")
+
+
+@pytest.mark.parametrize("ending", ["nc", "parquet", "csv"])
+def test_limits_that_are_held_and_that_are_crossed(ending, tmp_path):
+    """A run of a scene with stops is written as any other, and one without them keeps what it crossed."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="extra [data]")
+    model = pc.Multibody("ball")
+    model.add_body("b", None, "slider", axis=(0, 0, 1), mass=1.0, limits=(0, np.inf))
+    for stops in ([E.Limits(1e4, 0.0)], []):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", pc.ModelWarning)
+            run = pc.Scene(model).add(E.Gravity(), *stops).simulate(2.0, [1.0], [0.0], progress=False)
+        run.save(tmp_path / f"run.{ending}")
+        if ending == "csv":
+            continue
+        again = pc.load_run(tmp_path / f"run.{ending}")
+        same(run, again)
+        assert again.crossed_limits == run.crossed_limits and len(run.crossed_limits) == (not stops)
+
+
+@pytest.mark.parametrize("ending", ["nc", "parquet"])
+def test_a_run_that_switched(ending, tmp_path):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="extra [data]")
+    finger = pc.Multibody("finger")
+    finger.add_body("f", axis=(0, 0, 1), mass=0.01, com=(0.02, 0, 0), inertia=1e-6 * np.eye(3))
+    run = pc.Scene(finger).add(E.TorqueSource(0.2), E.CoulombFriction(0.5)).simulate(1.0, [0.0], [0.0], progress=False)
+    run.save(tmp_path / f"run.{ending}")
+    again = pc.load_run(tmp_path / f"run.{ending}")
+    same(run, again)
+    assert [method for _, method in again.statistics["switches"]] == ["rosenbrock4"]

@@ -119,8 +119,8 @@ def test_added_removed_enabled_disabled(arm):
         (lambda: scene.remove("brak"), "the scene of 'arm' has no effect 'brak'; did you mean 'brake'"),
         (lambda: scene.enable("gravty"), "no effect 'gravty'; did you mean 'gravity'"),
         (lambda: scene.add(E.Gravity(), name="brake"), "has an effect 'brake' already; give another name"),
-        (lambda: scene.add(E.Gravity(), E.Gravity(), name="both"), "name='both' is of one effect, not of 2"),
-        (lambda: pc.Scene(3), "a scene is of a model, not of 3"),
+        (lambda: scene.add(E.Gravity(), E.Gravity(), name="both"), "name='both' names one effect, but 2 were given"),
+        (lambda: pc.Scene(3), "Scene takes a model, not 3"),
     ):
         with pytest.raises(pc.ModelError, match=text):
             call()
@@ -228,12 +228,9 @@ def test_a_run_counts_its_passes(arm):
     run = scene.simulate(0.1, integrator="rk4", step=0.01)
     assert run.statistics["evaluations"] == 40
     assert run.statistics["passes"] == {"poses": 40, "twists": 40, "damping": 40, "wrench": 40, "accelerations": 40}
-    assert scene.simulate(0.1, integrator="rk4", step=0.01, energy=False).statistics["passes"] == {
-        "poses": 40,
-        "damping": 40,
-        "wrench": 40,
-        "accelerations": 40,
-    }
+    # Without works, also once at the start, where the stability of fixed steps is checked.
+    plain = scene.simulate(0.1, integrator="rk4", step=0.01, energy=False)
+    assert plain.statistics["passes"] == {"poses": 41, "damping": 41, "wrench": 41, "accelerations": 41}
 
 
 def test_the_plan_in_words(arm):
@@ -349,7 +346,7 @@ def test_plain_data():
         "phase": 0.0,
         "offset": 0.0,
     }
-    with pytest.raises(pc.ModelError, match="is no plain data"):
+    with pytest.raises(pc.ModelError, match="is not plain data"):
         E.TorqueSource(lambda t: t).to_dict()
     assert repr(E.CoulombFriction(0.1, hinges="a*")) == "CoulombFriction(level=0.1, hinges='a*')"
 

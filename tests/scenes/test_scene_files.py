@@ -174,8 +174,8 @@ def test_functions_are_refused_by_name(arm, tmp_path):
     scene = pc.Scene(arm).add(lambda t, state: np.zeros(7), name="push").add(E.Sampled(lambda t, state: np.zeros(7), 0.1), E.Gravity())
     scene.add(E.Prescribed("panda_joint5", np.sin), name="sway")
     text = (
-        "no file holds functions or classes of Python's, as of 'push' (UserEffect), 'sampled' (Sampled), 'sway' (Prescribed): give numbers "
-        "over time as pc.effects.Table, Spline or Harmonic; what is left, remove from the scene and add again when the file is loaded"
+        "a file cannot hold Python functions or classes, as in 'push' (UserEffect), 'sampled' (Sampled), 'sway' (Prescribed): give values "
+        "over time as pc.effects.Table, Spline or Harmonic; remove the other effects before saving, and add them again after loading"
     )
     with pytest.raises(pc.ModelError, match=re.escape(text)):
         scene.save(tmp_path / "scene.toml")
@@ -186,16 +186,16 @@ def test_functions_are_refused_by_name(arm, tmp_path):
 @pytest.mark.parametrize(
     ("save", "text"),
     [
-        (lambda s, p: s.save(p / "scene.json"), "scene.json: a scene's file ends in .toml"),
+        (lambda s, p: s.save(p / "scene.json"), "scene.json: the file of a scene must end in .toml"),
         (lambda s, p: s.save(p / "none" / "scene.toml"), "scene.toml: cannot be written: No such file or directory"),
         (lambda s, p: s.save(3.5), "a scene is saved at the path of a file, not at 3.5"),
         (lambda s, p: s.save(p / "scene.toml", model="ur5"), "model='ur5' is not the model of this scene, 'panda': they differ"),
         (lambda s, p: s.save(p / "scene.toml", model="pandda"), "no robot of the package is called 'pandda'; did you mean 'panda'?"),
         (lambda s, p: s.save(p / "scene.toml", model=p / "none.toml"), "none.toml: cannot be read: No such file or directory"),
-        (lambda s, p: s.to_dict(model={"robot": "panda", "rot": "free"}), "a model that is named has no key 'rot'; did you mean 'root'?"),
+        (lambda s, p: s.to_dict(model={"robot": "panda", "rot": "free"}), "a reference to a model has no key 'rot'; did you mean 'root'?"),
         (
             lambda s, p: s.to_dict(model={"robot": "panda", "mimic": "lock"}),
-            "mimic is an option of files; no robot of the package has a joint",
+            "mimic applies only to files; no robot of the package has a joint",
         ),
         (lambda s, p: s.to_dict(model={}), 'a scene names its model by a path, "arm.toml", or a robot of the package, "panda"'),
     ],
@@ -211,7 +211,7 @@ def test_run_options(arm):
     assert scene.run_options == {}
     with pytest.raises(pc.ModelError, match="run_options has no 'rtoll'; did you mean 'rtol'"):
         scene.run_options = {"rtoll": 1}
-    with pytest.raises(pc.ModelError, match="run_options: a dictionary with some of T, integrator"):
+    with pytest.raises(pc.ModelError, match="run_options must be a dictionary with some of T, integrator"):
         scene.run_options = 3
     assert scene.run_options == {}
 
@@ -225,7 +225,7 @@ ENTRY = f"{HEAD}[[effects]]\n"
 @pytest.mark.parametrize(
     ("text", "line", "message"),
     [
-        ("", 1, 'a scene has no model; name one: model = "panda", model = "arm.toml", or write it as tables, [[model.bodies]]'),
+        ("", 1, 'the scene has no model; name one: model = "panda", model = "arm.toml", or write it as tables, [[model.bodies]]'),
         ('model = "pandda"', 1, "the model of a scene: no robot of the package is called 'pandda'; did you mean 'panda'?"),
         ('\nmodel = "arm.urdf"', 2, "the model of a scene: "),
         ("model = 3", 1, "the model of a scene: a scene names its model by a path"),
@@ -238,14 +238,14 @@ ENTRY = f"{HEAD}[[effects]]\n"
         (HEAD + "refine = 1.5", 2, "a scene: refine=1.5"),
         (HEAD + 'precision = "half"', 2, "a scene: "),
         (HEAD + "[state.q]\npanda_joint9 = 1", 3, "q of the state: no hinge is called 'panda_joint9'; did you mean 'panda_joint7'?"),
-        (HEAD + "[run]\nT = -1", 3, "the run: T = -1; it is positive, in seconds"),
+        (HEAD + "[run]\nT = -1", 3, "the run: T = -1; it must be positive, in seconds"),
         (HEAD + "[run]\nTime = 1", 3, "the run has no key 'Time'; "),
         (HEAD + '[run]\nintegrator = "rk5"', 3, "the run: integrator = 'rk5'; did you mean 'rk4'?"),
-        (ENTRY + "coefficient = 1", 2, 'effect number 1 says no effect; write which one it is: effect = "Damping"'),
+        (ENTRY + "coefficient = 1", 2, 'effect number 1 names no effect; add its kind, such as effect = "Damping"'),
         (ENTRY + 'effect = "Dampnig"', 3, "effect number 1: no effect is called 'Dampnig'; did you mean 'Damping'?"),
         (ENTRY + 'name = "wind"\neffect = "coulomb"', 4, "effect 'wind': no effect is called 'coulomb'; did you mean 'coulomb_friction'?"),
-        (ENTRY + 'effect = "Sampled"', 3, "effect number 1: effect 'Sampled' calls a function of Python's, which no file holds; add it"),
-        (ENTRY + 'effect = "Damping"', 2, "effect 'damping' (Damping) has no coefficient; give it one: coefficient = ..."),
+        (ENTRY + 'effect = "Sampled"', 3, "effect number 1: effect 'Sampled' calls a Python function, which a file cannot hold; add it"),
+        (ENTRY + 'effect = "Damping"', 2, "effect 'damping' (Damping) needs coefficient; write coefficient = ..."),
         (ENTRY + 'effect = "Damping"\ncoeff = 1', 4, "effect 'damping' (Damping) has no key 'coeff'; did you mean 'coefficient'?"),
         (ENTRY + 'effect = "Damping"\ncoefficient = "much"', 4, "effect 'damping': damping: coefficient is not an array of numbers"),
         (ENTRY + 'effect = "Damping"\ncoefficient = nan', 4, "effect 'damping': damping: coefficient has an entry that is nan"),
@@ -258,9 +258,9 @@ ENTRY = f"{HEAD}[[effects]]\n"
         (ENTRY + 'effect = "TorqueSource"\ntorque = { in_time = "Harmonik" }', 4, "torque: in_time = 'Harmonik'; did you mean 'Harmonic'?"),
         (
             ENTRY + 'effect = "TorqueSource"\ntorque = { in_time = "Harmonic", amplitude = 1 }', 4,
-            "effect 'torque_source': torque, a Harmonic, has no frequency; give it one: frequency = ...",
+            "effect 'torque_source': torque, a Harmonic, needs frequency; write frequency = ...",
         ),
-        (ENTRY + 'effect = "TorqueSource"\ntorque = { in_time = "Table", times = [0], values = [1] }', 4, "a table takes two times"),
+        (ENTRY + 'effect = "TorqueSource"\ntorque = { in_time = "Table", times = [0], values = [1] }', 4, "at least two times"),
         (ENTRY + 'effect = "Gravity"\n[[effects]]\nname = "gravity"\neffect = "Gravity"', 5, "has an effect 'gravity' already"),
         (
             ENTRY + 'effect = "Prescribed"\nhinge = "panda_joint1"\nmotion = 1\n[[effects]]\nname = "again"\neffect = "Prescribed"\n'

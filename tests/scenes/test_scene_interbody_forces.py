@@ -56,7 +56,7 @@ def test_along_a_run():
         close(f[i], scene.interbody_forces(hinge, run.q[i], run.v[i], run.t[i], axes="world"))
     at = run.at(0.07)
     close(at.interbody_forces(), scene.interbody_forces(None, at.q, at.v, 0.07))
-    with pytest.raises(pc.EvaluationError, match="no scene behind it"):
+    with pytest.raises(pc.EvaluationError, match="this motion has no scene"):
         pickle.loads(pickle.dumps(run)).interbody_forces()
     model.bodies["body1"].mass = 2.0
     with pytest.raises(pc.StaleOperatorError):
@@ -106,7 +106,7 @@ def test_batches_are_rows():
     close(scene.interbody_forces(None, q[0], v)[2], scene.interbody_forces(None, q[0], v[2]))
     close(scene.interbody_forces(None, q[:1]), scene.interbody_forces(None, q[0])[None])
     assert scene.interbody_forces(None, q[:0], v[:0], states=own[:0], axes="world").shape == (0, len(model.bodies), 6)
-    with pytest.raises(pc.ModelError, match=r"batches of q \(3, \d+\), v \(2, \d+\) and states"):
+    with pytest.raises(pc.ModelError, match=r"q \(3, \d+\), v \(2, \d+\) and states .* are batches of different sizes"):
         scene.interbody_forces(None, q, v[:2])
 
 

@@ -129,9 +129,9 @@ def test_members_of_a_batch_and_what_does_not_fit(model):
     whole = scene.linearize(Q, V, [0.0, 1.0, 2.0], states=[[0.1], [0.2], [0.3]])
     assert whole.t.tolist() == [0.0, 1.0, 2.0] and whole[1].t == 1.0 and np.array_equal(whole[1].q, Q[1])
     agree(whole[2].A, scene.linearize(Q[2], V[2], 2.0, states=[0.3]).A)
-    with pytest.raises(pc.ModelError, match="has the shape .2, 6.; there are 3 states, or one for all"):
+    with pytest.raises(pc.ModelError, match="has the shape .2, 6.; give 3 states, or one for all"):
         scene.linearize(Q, V[:2])
-    with pytest.raises(pc.ModelError, match="there are 3 states, or one for all"):
+    with pytest.raises(pc.ModelError, match="give 3 states, or one for all"):
         scene.linearize(Q, V, [0.0, 1.0])
     with pytest.raises(pc.ModelError, match="states: entry 0 is nan"):
         scene.linearize(Q[0], V[0], states=[np.nan])
@@ -170,5 +170,5 @@ def test_a_run_brings_its_times_and_the_states_of_its_effects():
     agree(scene.evaluate(late).vdot, scene.evaluate(late.q, late.v, 0.15, states=late.states).vdot)
     agree(scene.interbody_forces(None, run), run.interbody_forces(), 1e-9)
     agree(scene.interbody_forces("hinge0", run)[2], scene.interbody_forces("hinge0", run.q[2], run.v[2], run.t[2], states=run.states[2]))
-    with pytest.raises(pc.ModelError, match="batches of q .5, 2., v .5, 2. and states .5, 6., t .3,. in one call"):
+    with pytest.raises(pc.ModelError, match="q .5, 2., v .5, 2. and states .5, 6., t .3,. are batches of different sizes"):
         scene.interbody_forces(None, run, t=[0.0, 0.1, 0.2])

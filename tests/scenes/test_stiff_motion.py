@@ -64,7 +64,7 @@ def test_said_early_and_of_whom(integrator):
 
 def test_an_arm_that_friction_holds():
     scene, q = held_arm()
-    run, text = stopped_by_its_warning(scene, 10.0, q, np.zeros(6))
+    run, text = stopped_by_its_warning(scene, 10.0, q, np.zeros(6), integrator="dopri5")
     assert run.statistics["steps"] < 5000 and run.t[-1] < 0.1
     assert "'coulomb_friction' damps coordinate 'wrist_" in text  # the lightest
 
@@ -78,11 +78,11 @@ def test_said_once_for_each_scene_and_in_sweeps():
     scene = stuck()
     with pytest.warns(pc.ModelWarning, match="is stiff") as caught:
         for _ in range(2):
-            scene.simulate(10.0, [0.0], [0.0], **QUIET)
+            scene.simulate(10.0, [0.0], [0.0], integrator="dopri5", **QUIET)
     assert sum("is stiff" in str(w.message) for w in caught) == 1
     scene = stuck()
     with pytest.warns(pc.ModelWarning, match="is stiff") as caught:
-        pc.sweep(scene, pc.samples.states(scene.model, 3, seed=1), 10.0, workers=1, progress=False)
+        pc.sweep(scene, pc.samples.states(scene.model, 3, seed=1), 10.0, integrator="dopri5", workers=1, progress=False)
     assert sum("is stiff" in str(w.message) for w in caught) == 1
 
 
@@ -90,7 +90,7 @@ def test_stiffness_that_passes_is_no_matter():
     """A block that sticks for a tenth of a second and slips then: 660 steps in all, and no word."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", pc.ModelWarning)
-        assert block(1e-4).simulate(5.0, [0.0], [0.0], rtol=1e-8, atol=1e-10, **QUIET).statistics["steps"] < 2000
+        assert block(1e-4).simulate(5.0, [0.0], [0.0], integrator="dopri5", rtol=1e-8, atol=1e-10, **QUIET).statistics["steps"] < 2000
 
 
 def test_trajectories_of_a_model_say_it_too():
@@ -152,6 +152,18 @@ def test_fast_oscillations_are_no_stiffness():
 
 
 # ---------------------------------------------------------------------- "auto"
+
+
+def test_the_default_is_dopri5_until_the_motion_is_stiff():
+    """Bit for bit, in runs and sweeps; and where it is, the motion that looked hung takes a few hundred steps, without a word."""
+    scene = pc.mechanisms.double_pendulum()
+    default, plain = (scene.simulate(1.0, **how, **QUIET) for how in ({}, {"integrator": "dopri5"}))
+    assert default.statistics["switches"] == [] and default.statistics["evaluations"] == plain.statistics["evaluations"]
+    assert np.array_equal(default.t, plain.t) and np.array_equal(default.q, plain.q) and np.array_equal(default.v, plain.v)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pc.ModelWarning)
+        run = finger().simulate(1.0, [0.0], [0.0], **QUIET)
+    assert run.statistics["steps"] < 1000 and run.q[-1, 0] == pytest.approx(0.00423649, abs=1e-7)
 
 
 def test_auto_takes_what_is_for_stiff_motion():

@@ -162,7 +162,7 @@ def test_states_that_make_no_sense(arm):
     class NoRates(Brake):
         states = [0.0]
 
-    with pytest.raises(pc.ModelError, match=r"effect 'no_rates' has 1 states of its own and no rates\(t, state\)"):
+    with pytest.raises(pc.ModelError, match=r"effect 'no_rates' has 1 states of its own but no rates\(t, state\)"):
         pc.Scene(arm).add(NoRates())
     with pytest.raises(pc.ModelError, match="effect 'brake': its rates function gives 2 numbers where 1 is expected"):
         pc.Scene(arm).add(E.UserEffect(Brake(), states=[0.0], rates=lambda t, s: [0.0, 0.0])).simulate(0.1)

@@ -160,16 +160,16 @@ struct TreeTheorems : Statements {
     state("Ω decomposed by Υ", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde, chain);
     state("Ω decomposed by Υ, blocks on one path", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde);
     list.back().on_one_path = true;
-    shown("Ω = Υ + ψ̃* Υ + Υ ψ̃ in the blocks on one path to the base",
-          "[\\Omega = \\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi]_{(i,j)\\text{ on one path to the base}}");
+    shown("Ω(i,j) = [Υ + ψ̃*Υ + Υψ̃](i,j), i and j on one path to the base",
+          "\\Omega(i,j) = [\\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi]\\,(i,j),\\quad i\\text{ and }j\\text{ on one path to the base}");
     const Expression siblings = E_psi.T() * Upsilon * E_psi - block_diagonal(E_psi.T() * Upsilon * E_psi);
     state("Ω decomposed with siblings", Omega, Upsilon + psi_tilde.T() * Upsilon + Upsilon * psi_tilde + psi.T() * siblings * psi, no_hypothesis, check,
           "soa.md #28");
     shown("Ω = Υ + ψ̃*Υ + Υψ̃ + ψ*Sψ,  S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ)",
-          "\\Omega = \\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi + \\psi^*S\\psi,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\cdot)");
+          "\\Omega = \\Upsilon + \\tilde\\psi^*\\Upsilon + \\Upsilon\\tilde\\psi + \\psi^*S\\psi,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi)");
     state("Lyapunov equation with siblings", Upsilon - E_psi.T() * Upsilon * E_psi + siblings, H.T() * D.inv() * H, no_hypothesis, check, "soa.md #29");
     shown("Υ - E_ψ*ΥE_ψ + S = H*D⁻¹H,  S = E_ψ*ΥE_ψ - blockdiag(E_ψ*ΥE_ψ)",
-          "\\Upsilon - \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi + S = H^*\\mathcal{D}^{-1}H,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\cdot)");
+          "\\Upsilon - \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi + S = H^*\\mathcal{D}^{-1}H,\\quad S = \\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi - \\operatorname{blockdiag}(\\mathcal{E}_\\psi^*\\Upsilon \\mathcal{E}_\\psi)");
     state("ΩMΩ = Ω", Omega * M * Omega, Omega, no_hinge_diagonal, check, "soa.md #3");
     state("the bodies' shares add up to N", trace(Upsilon * M), number(source->structure().coordinates()), no_hinge_diagonal, check, "soa.md #4");
     state("(I-ΩM)φ* = ψ*-ΩP", (I - Omega * M) * phi.T(), psi.T() - Omega * P, no_hypothesis, check, "soa.md #5");
@@ -189,8 +189,8 @@ struct TreeTheorems : Statements {
     const Expression error = (MM_prime.inv() - MM.inv()) * T, moved = MM_prime.inv() * T;
     state("perturbed inertias, relative error in the ℳ norm", error.T() * MM * error, (largest * largest) * moved.T() * MM * moved, no_hypothesis, check, "soa.md #57");
     list.back().at_most = true;
-    shown("‖x'-x‖_ℳ ≤ max_k ‖M^-½ δM M^-½‖ ‖x'‖_ℳ,  ℳx = ℳ'x' = T",
-          "\\Vert x'-x\\Vert_{\\mathcal{M}} \\le \\max_k \\Vert M_k^{-1/2}\\,\\delta M_k\\,M_k^{-1/2}\\Vert\\,\\Vert x'\\Vert_{\\mathcal{M}}");
+    shown("tr[(L - ℳ⁻¹)*ℳ(L - ℳ⁻¹)] ≤ ‖C‖² tr[L*ℳL],  L = (Hφ(M + M^½CM^½*)φ*H*)⁻¹,  C : W → W",
+          "\\operatorname{tr}[(L-\\mathcal{M}^{-1})^*\\mathcal{M}(L-\\mathcal{M}^{-1})] \\le \\Vert C\\Vert^2\\operatorname{tr}[L^*\\mathcal{M}L],\\quad L = (H\\phi(M+M^{1/2}C(M^{1/2})^*)\\phi^*H^*)^{-1},\\quad C : W \\to W");
   }
 
   void rerooting_and_aggregation() {
@@ -205,11 +205,12 @@ struct TreeTheorems : Statements {
     const Expression seen = block_diagonal(E.T() * Upsilon * E) + constant_blocks(std::move(at_root), source->forces(), source->motions(), "I_r");
     const Expression other = seen.inv() - P_plus;
     state("two-filter form", Upsilon.inv(), P + other - other * H.T() * (H * other * H.T()).inv() * H * other, free_root | equal_blocks | no_hinge_diagonal, check, "soa.md #58");
-    shown("Υ⁻¹ = P + S⁺,  S = (E*ΥE)⁻¹ - P⁺", "\\Upsilon^{-1} = P + S^{+},\\quad S = (\\mathcal{E}^*\\Upsilon \\mathcal{E})^{-1} - P^{+}");
+    shown("Υ⁻¹(k) = P(k) + S(k) - S(k)H*(k)(H(k)S(k)H*(k))⁻¹H(k)S(k),  S(k) = (φ*(℘(k),k)Υ(℘(k))φ(℘(k),k))⁻¹ - P⁺(k)",
+          "\\Upsilon^{-1}(k) = P(k) + S(k) - S(k)H^*(k)(H(k)S(k)H^*(k))^{-1}H(k)S(k),\\quad S(k) = (\\phi^*(\\wp(k),k)\\Upsilon(\\wp(k))\\phi(\\wp(k),k))^{-1} - P^{+}(k)");
     const Letters grouped(std::make_shared<AggregatedTree>(source));
     state("bodies grouped in pairs: the same mass matrix", grouped.H * grouped.phi * grouped.M * grouped.phi.T() * grouped.H.T(), MM, no_hypothesis, check,
           "soa.md #64");
-    shown("ℳ of bodies grouped in pairs = ℳ", "\\mathcal{M}_{\\text{pairs}} = \\mathcal{M}");
+    shown("ℳ_2 = ℳ", "\\mathcal{M}_2 = \\mathcal{M}");
   }
 
   const Expression A = I + H * phi * K;  // the innovations factor

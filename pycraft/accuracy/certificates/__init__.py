@@ -1,1 +1,1 @@
-"""Certificates: a value with its measured error, its condition, where digits are lost and what the next rung costs."""
+"""Certificates: a value with its measured error, its condition, the places of lost digits, and the cost of the next rung."""

@@ -1,4 +1,4 @@
-"""What a certificate says."""
+"""The contents of a certificate."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from ...tidy import error_text
 from ..rungs import Rung, epsilon
 
 LISTED = 5
-"""Hinges that the table names, worst first."""
+"""Largest number of hinges in the table, worst first."""
 
 LOST = 1.0
-"""Digits from which on the table says that a hinge lost some: a D(k) that rounds a few times is off by a few units of the last place."""
+"""Least number of lost digits that the table reports: a few roundings of D(k) cost a few units of the last place."""
 
 
 @dataclass(frozen=True)
 class HingeLoss:
-    """A hinge, the relative error of its D(k), and the decimal digits that are gone there."""
+    """A hinge, the relative error of its D(k), and the decimal digits lost there."""
 
     hinge: str
     error: float
@@ -27,9 +27,9 @@ class HingeLoss:
 
 @dataclass(frozen=True)
 class NextRung:
-    """The first step above with at most half the error: its measured error, against what, and its time over that of the rung in use.
+    """The first step above with at most half the error: its measured error, the reference, and its time relative to the rung in use.
 
-    `refused` has the steps that were tried before it and refused, with their reason; `passed` those that were no better, with their error.
+    `refused` lists earlier steps that refused, with the reason; `passed` lists earlier steps that were no better, with their error.
     """
 
     rung: Rung
@@ -42,33 +42,33 @@ class NextRung:
 
 @dataclass(frozen=True, repr=False)
 class Certificate:
-    """A value, and what is known of its accuracy.
+    """A value, and measurements of its accuracy.
 
     Attributes
     ----------
-    value : the array or number, as the call returns it
+    value : the array or number returned by the call
     error : float
-        Relative error, measured against `reference`: 2-norm of the difference over that of the reference.
+        Relative error, measured against `reference`: 2-norm of the difference over the 2-norm of the reference.
     reference : str
-        "quad" for a value in double, single or extended precision; the next wider precision for one in quad or more, and where the next
-        wider one shows that the reference itself is off by more than a tenth of the error.
+        "quad" for a value in double, single or extended precision; the next wider precision for a value in quad or more, and if the next
+        wider one shows an error of the reference itself above a tenth of the error.
     condition : float or None
         1-norm condition number, estimated, of `condition_of`: ℳ + J for forward dynamics, else the square operator itself.
     input_errors : dict
-        Of each array that the value is of, q, v, tau or x: the relative change of the value, in the reference's precision, when all its
+        For each input array, q, v, tau or x: the relative change of the value, in the reference's precision, when all its
         numbers move by half a unit in their last place. A coordinate that is 0 moves by half an epsilon of 1 rad or 1 m; a zero of v, tau
-        or x is exact. What rounding of the data alone does: no algorithm on doubles can promise less unless they are exact.
+        or x is exact. This is the effect of rounding the data alone: no algorithm on doubles can promise less unless the data are exact.
     input_error : float or None
-        The largest of them.
+        The largest of `input_errors`.
     floor : float or None
-        What refinement reaches in the worst case of signs, see `pycraft.accuracy.certificates.floor`; the error may be below it.
+        Limit of refinement in the worst case of signs, see `pycraft.accuracy.certificates.floor`; the error may be below it.
     locator : list of HingeLoss
-        The relative error of D(k) at each hinge, worst first; empty where the plan has no articulated sweep. It shows where digits went.
-        It proves nothing: a wrong D(k) may matter little to the value, and sweeps lose digits where every D(k) is right.
+        The relative error of D(k) at each hinge, worst first; empty if the plan has no articulated sweep. It shows where digits were lost.
+        It proves nothing: an inaccurate D(k) may hardly affect the value, and sweeps may lose digits although every D(k) is accurate.
     next_rung : NextRung or None
-        The first step above that at least halves the error; None where the error is at rounding level, or where none does.
+        The first step above that at least halves the error; None if the error is at rounding level, or if no step does.
     notes : dict
-        Why a number is None.
+        Reasons why values are None.
     """
 
     what: str
@@ -86,17 +86,17 @@ class Certificate:
 
     @property
     def input_error(self) -> float | None:
-        """The largest of `input_errors`, None where nothing was moved."""
+        """The largest of `input_errors`, None if nothing was moved."""
         return max(self.input_errors.values(), default=None)
 
     def verdict(self) -> str:
-        """One sentence: is a higher rung worth it?"""
+        """Return one sentence: is a higher rung worth it?"""
         if self.error <= rounding_level(self.rung.precision):
             return "the value is right to rounding: no higher rung is needed"
         if self.input_error is None:
             return ""
         if self.error == float("inf"):
-            return "the exact value is zero, and what is returned is rounding: no error relative to it is finite"
+            return "the exact value is zero, and the returned value is rounding: no relative error is finite"
         if self.error <= self.input_error:
             names = [name for name, moved in self.input_errors.items() if moved >= self.error]
             exact = f"{_listed(names)} {'is' if len(names) == 1 else 'are'} exact"
@@ -104,15 +104,15 @@ class Certificate:
         if self.floor is not None and self.error <= self.floor:
             return "the error is within the floor: refinement with this residual may leave as much"
         if not self.input_error:
-            return "moving the data in their last place changes nothing: what is lost, the algorithm loses"
+            return "moving the data in their last place changes nothing: the algorithm causes the whole error"
         times = self.error / self.input_error
         if times < 10:
             return "the value is nearly as good as its data"
         worst = max(self.input_errors, key=lambda name: self.input_errors[name])
-        return f"the error is {times:{'.0f' if times < 1000 else '.0e'}} times what rounding {worst} does"
+        return f"the error is {times:{'.0f' if times < 1000 else '.0e'}} times the effect of rounding {worst}"
 
     def lines(self) -> list[tuple[str, str, str]]:
-        """Name, number and remark of each line of the table."""
+        """Return name, number and remark of each line of the table."""
         against = f"relative, measured against {self.reference}"
         out = [("error", error_text(self.error), f"{self.notes['error']}, by {self.reference}" if "error" in self.notes else against)]
         moved = "moved by half a unit in the last place of every number"
@@ -122,7 +122,7 @@ class Certificate:
         out += [("data" if i == 0 else "", *line) for i, line in enumerate(data)]
         of = f"of {self.condition_of}, 1-norm, estimated"
         out.append(("condition", error_text(self.condition), of if self.condition is not None else self.notes.get("condition", "")))
-        reach = "what refinement reaches in the worst case of signs"
+        reach = "limit of refinement in the worst case of signs"
         out.append(("floor", error_text(self.floor), reach if self.floor is not None else self.notes.get("floor", "")))
         return out + self._climb() + self._located()
 
@@ -163,7 +163,7 @@ class Certificate:
 
 
 def rounding_level(precision: Any) -> float:
-    """The error that is none: a unit in the last place of the precision, or of a double where that is finer, as values are returned."""
+    """Return the error that counts as rounding: a unit in the last place of the precision, but at least of the returned double."""
     return min(epsilon(precision), epsilon("double"))
 
 

@@ -1,4 +1,4 @@
-"""Certificates: a value with its measured error, what the data alone do to it, where digits went, and what the next rung costs."""
+"""Certificates: a value with its measured error, the effect of rounded data, the places of lost digits, and the cost of the next rung."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from .floor import refinement_floor
 from .locator import condition_estimate, hinge_losses, runs_articulated_sweep
 
 STEP_UP = 2.0
-"""A rung is a step up where its error is smaller by this factor."""
+"""A rung is a step up if its error is smaller by this factor."""
 
 VANISHING = 1e4
-"""A reference that is smaller in a wider precision by the ratio of the epsilons, within this factor, is nothing but rounding."""
+"""A reference that falls in a wider precision by the ratio of the epsilons, within this factor, is only rounding."""
 
 
 def certify_dynamics(
@@ -41,21 +41,21 @@ def certify_dynamics(
     method: str = "articulated",
     on_singular: str = "raise",
 ) -> Certificate:
-    """Forward dynamics at one state, certified: see `Certificate` for what is measured.
+    """Certify forward dynamics at one state; see `Certificate` for the measurements.
 
     Parameters
     ----------
-    q : (nq,) or a State, whose v is taken then
-    v, tau : (nv,), zero where left out
+    q : (nq,), or a State, which also gives v
+    v, tau : (nv,), default zero
     form, refine, residual, precision : as in `forward_dynamics`
-    seed : of the signs by which q, v and tau are moved, 0 or above
-    seconds : spent on each timing
-    method, on_singular : no other than these; certificates are of the articulated method, and of what it answers
+    seed : seed of the signs by which q, v and tau are moved, 0 or above
+    seconds : time spent on each timing
+    method, on_singular : only these values; certificates exist for the articulated method and for values that it returns
 
     Returns
     -------
     Certificate
-        Its value is the accelerations (nv,).
+        Its value are the accelerations (nv,).
 
     Cost: a dozen evaluations in quad precision and one in 50 digits, O(N); the floor, up to 400 coordinates, O(N²).
 
@@ -64,9 +64,9 @@ def certify_dynamics(
     ModelError
         An array of another shape; a model without coordinates.
     EvaluationError
-        A form, precision or seed that is not there; another method.
+        An unknown form or precision, an invalid seed; another method.
     ArithmeticError
-        What `forward_dynamics` raises: there is no certificate of a value that is refused.
+        As for `forward_dynamics`: a refused value has no certificate.
 
     Examples
     --------
@@ -129,30 +129,30 @@ def certify_expression(
     method: str = "articulated",
     on_singular: str = "raise",
 ) -> Certificate:
-    """An expression's value at one state, certified: of an operator the dense form, or its product with x; of a scalar the number.
+    """Certify an expression's value at one state: for an operator its dense form or its product with x, for a scalar the number.
 
     Parameters
     ----------
     expr : an operator or scalar expression that is not bound to a state
-    q : (nq,) or a State; the model's present state where left out
-    x : (n,) or (n, m), what the operator is applied to; its dense form where left out
-    v : (nv,), zero where left out
+    q : (nq,) or a State; default: the model's present state
+    x : (n,) or (n, m), argument of the operator; default: certify its dense form
+    v : (nv,), default zero
     form, refine, residual, precision : as in `expr.at`
-    seed : of the signs by which q, v and x are moved, 0 or above
-    seconds : spent on each timing
-    method, on_singular : no other than these; certificates are of the articulated method, and of what it answers
+    seed : seed of the signs by which q, v and x are moved, 0 or above
+    seconds : time spent on each timing
+    method, on_singular : only these values; certificates exist for the articulated method and for values that it returns
 
-    A scalar, and x @ in a precision of double or below, is measured as it is returned, rounded to double. Where the plan has no
-    articulated sweep there is no locator, and the form says nothing.
+    A scalar, and x @ in a precision of double or below, is measured as returned, rounded to double. If the plan has no
+    articulated sweep, there is no locator, and the form has no effect.
 
     Raises
     ------
     ModelError
         An array of another shape; a model without coordinates.
     EvaluationError
-        An expression that is bound already; a form, precision or seed that is not there; another method; x beside a scalar.
+        A bound expression; an unknown form or precision, an invalid seed; another method; x with a scalar.
     ArithmeticError
-        What the evaluation raises.
+        As for the evaluation.
 
     Examples
     --------
@@ -181,7 +181,7 @@ def certify_expression(
     steps = _steps(rung, articulated, any(_has_inverse(operand) for operand in operands))
 
     def in_full(at: Data, step: Rung) -> Any:
-        """The value before it is rounded to double, where there is more of it."""
+        """Return the value before rounding to double, if it has more digits."""
         whole = expr
         if x is not None:
             columns = at["x"].reshape(len(at["x"]), -1)
@@ -215,11 +215,11 @@ def certify_expression(
 
 
 def _check_certifiable(expr: Any, operands: Sequence[Any], models: Sequence[Any], x: Any) -> None:
-    """Raise EvaluationError for an expression that is bound, a number beside x, or without entries; ModelError without coordinates."""
+    """Raise EvaluationError for an expression that is bound, scalar with x, or without entries; ModelError without coordinates."""
     if any(_bound(operand) for operand in operands):
         raise _core.EvaluationError(f"{expr.text()} is bound to a state already; certify the expression itself: expr.certify(q)")
     if x is not None and isinstance(expr, _core.Scalar):
-        raise _core.EvaluationError(f"{expr.text()} is a number: there is nothing to apply to x")
+        raise _core.EvaluationError(f"{expr.text()} is a number, which cannot be applied to x; leave x out")
     for model in models:
         check_coordinates(model)
     if any(0 in operand.shape for operand in operands):
@@ -227,7 +227,7 @@ def _check_certifiable(expr: Any, operands: Sequence[Any], models: Sequence[Any]
 
 
 def _expression_state(models: Sequence[Any], q: Any, v: Any) -> tuple[Any, Any]:
-    """(q, v) of the first model, checked: of a State, or the model's present ones where left out; as given without a model."""
+    """Return checked (q, v) of the first model: from a State, default the model's present ones; unchanged without a model."""
     if v is None and hasattr(q, "v"):
         v = q.v
     if not models:
@@ -239,11 +239,11 @@ def _expression_state(models: Sequence[Any], q: Any, v: Any) -> tuple[Any, Any]:
 
 
 def _expression_notes(data: Data, articulated: bool) -> dict[str, str]:
-    """Why a part of the certificate is not there."""
-    notes = {"floor": "is there for forward dynamics"}
+    """Return why parts of the certificate are missing."""
+    notes = {"floor": "exists only for forward dynamics"}
     notes |= {name: f"{name} is zero, and exact" for name in ("v", "x") if name in data and not data[name].any()}
     if "q" not in data:
-        notes["input_error"] = "q is moved where it has the coordinates of one model"
+        notes["input_error"] = "q is moved only if it has the coordinates of one model"
     if not articulated:
         notes["locator"] = "the plan has no articulated sweep: no D(k) is used, and no form matters"
     return notes
@@ -252,7 +252,7 @@ def _expression_notes(data: Data, articulated: bool) -> dict[str, str]:
 # ---------------------------------------------------------------------- the parts of a certificate
 @dataclass(frozen=True)
 class _Measured:
-    """What a certificate is made of: a value, and how to have it in another precision, of other data or in another way."""
+    """Contents of a certificate: a value, and functions that compute it in another precision, from other data or in another way."""
 
     what: str
     value: Any
@@ -267,7 +267,7 @@ class _Measured:
     time: Callable[[Rung], float]
     state: tuple[Any, Any]
     square: tuple[_core.Operator, str] | None
-    """The operator whose condition is told, and its name."""
+    """The operator for the condition number, and its name."""
     sources: list[_core.SkoSource]
     """The trees whose D(k) are used."""
     floor: Callable[[], float] | None
@@ -282,7 +282,7 @@ def _certificate(m: _Measured) -> Certificate:
     locator = [loss for source in m.sources for loss in hinge_losses(source, *m.state, m.rung, reference)]
     condition = None
     if m.square is None:
-        m.notes["condition"] = "is there for square operators"
+        m.notes["condition"] = "exists only for square operators"
     else:
         bound = m.square[0].at(*m.state, form=EXACT, precision=reference)
         condition = _noted(m.notes, "condition", lambda: condition_estimate(bound))
@@ -303,8 +303,8 @@ def _certificate(m: _Measured) -> Certificate:
 
 
 def _reference(m: _Measured, reference: Any) -> tuple[Any, Any, float]:
-    """The first precision from `reference` on whose value agrees with the next wider one's to a tenth of the error that it shows; the
-    value; that error. A value that falls with epsilon is rounding of zero, and zero then."""
+    """Return the first precision from `reference` on with a value that agrees with the next wider one's to a tenth of the measured error;
+    the value; and the error. A value that falls with epsilon is the rounding of zero, and is replaced by zero."""
     truth = m.exact(m.data, reference)
     error = m.error(m.rung, truth)
     while (finer := wider(reference)) is not None:
@@ -321,7 +321,7 @@ def _reference(m: _Measured, reference: Any) -> tuple[Any, Any, float]:
 
 
 def _next(m: _Measured, error: float, truth: Any) -> NextRung | None:
-    """The next rung that is a step up, measured; rungs that refuse on the way, or are no better, are told. None with a note."""
+    """Return the next rung that is a step up, measured, with the rungs that refused or were no better, or None with a note."""
     if error <= rounding_level(m.rung.precision):
         m.notes["next_rung"] = "none is needed: the value is right to rounding"
         return None
@@ -343,12 +343,12 @@ def _next(m: _Measured, error: float, truth: Any) -> NextRung | None:
             return NextRung(step, found, precision_name(reference), m.time(step) / m.time(m.rung), refused, passed)
         passed[step.label] = found
     tried = [f"{label} {error_text(found)}" for label, found in passed.items()] + [f"{label} refuses" for label in refused]
-    m.notes["next_rung"] = "none above halves the error" + (f": {', '.join(tried)}" if tried else "")
+    m.notes["next_rung"] = "no rung above halves the error" + (f": {', '.join(tried)}" if tried else "")
     return None
 
 
 def _steps(rung: Rung, articulated: bool, inverse: bool) -> list[Rung]:
-    """The steps above that change an expression's value: of form where the sweep runs, of refinement where there is an inverse."""
+    """Yield the steps above that change an expression's value: of form if the sweep runs, of refinement if there is an inverse."""
     steps = [step for step in above(rung) if inverse or not step.refine]
     same = epsilon(rung.precision)
     return [step for step in steps if articulated or step.form == rung.form or epsilon(step.precision) < same]
@@ -364,20 +364,20 @@ def _has_inverse(operator: Any) -> bool:
 
 
 def _noted(notes: dict[str, str], name: str, measure: Callable[[], float]) -> float | None:
-    """A number, or None and the reason why there is none."""
+    """Return a number, or None and note the reason."""
     try:
         found = measure()
     except (ArithmeticError, _core.Error) as reason:
         notes[name] = str(reason)
         return None
     if np.isnan(found):
-        notes[name] = "is no number at this state"
+        notes[name] = "is not a number at this state"
         return None
     return found
 
 
 def _seconds(evaluate: Callable[[], Any], budget: float) -> float:
-    """The least time of one evaluation within a budget of seconds, at least three of them."""
+    """Return the least time of one evaluation within a budget of seconds, from at least three."""
     times: list[float] = []
     while len(times) < 3 or (sum(times) < budget and len(times) < 1000):
         begin = perf_counter()

@@ -1,12 +1,12 @@
-"""The floor of refinement: what one residual in a given precision leaves.
+"""The floor of refinement: the error left by a residual in a given precision.
 
 A residual r = τ - (ℳθ̈ + 𝒞) is formed by inverse dynamics, whose two sweeps round at every body: the motion α(k) by u|α(k)|, the force
-by u(|M(k)||α(k)| + |f(k)|). What these make of θ̈ after the correction by ℳ⁻¹, in the worst case of signs, is
+by u(|M(k)||α(k)| + |f(k)|). Their effect on θ̈ after the correction by ℳ⁻¹, in the worst case of signs, is
 
     floor = u ‖ |ℳ⁻¹HφMφ*| |α| + |ℳ⁻¹Hφ| (|M||α| + |f|) ‖ / ‖θ̈‖
 
-with u half an epsilon of the precision in which the residual is formed, and at least half an epsilon of the one in which θ̈ is kept. Where
-forces alone are gathered in a wider precision, the second term has its u. Velocities and poses are taken as they are.
+with u half an epsilon of the precision of the residual, but at least half an epsilon of the precision of θ̈. If only
+forces are gathered in a wider precision, the second term has the u of that precision. Velocities and poses are taken as exact.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ..exact import EXACT
 from ..rungs import Rung, epsilon, wider
 
 LARGEST = 400
-"""Coordinates up to which a certificate has a floor: it needs two dense maps, (nv, 6n)."""
+"""Largest number of coordinates for which a certificate has a floor, which needs two dense maps, (nv, 6n)."""
 
 
 def refinement_floor(model: Any, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, rung: Rung) -> float:
-    """The floor at a state with accelerations vdot (nv,). Cost O(N²) in extended precision.
+    """Return the floor at a state with accelerations vdot (nv,). Cost O(N²) in extended precision.
 
-    Raises EvaluationError above LARGEST coordinates, and where the floor is no number.
+    Raises EvaluationError above LARGEST coordinates, and if the floor is not a number.
     """
     if model.nv > LARGEST:
-        raise _core.EvaluationError(f"needs dense maps, and is computed up to {LARGEST} coordinates")
+        raise _core.EvaluationError(f"needs dense maps, and is computed only up to {LARGEST} coordinates")
     above = wider(rung.precision) or rung.precision
     residual = above if rung.residual == "wider" else rung.precision
     forces = epsilon(above) / epsilon(rung.precision) if rung.residual == "gather" else 1.0
@@ -41,7 +41,8 @@ def refinement_floor(model: Any, q: np.ndarray, v: np.ndarray, vdot: np.ndarray,
 
 
 def floors(model: Any, q: np.ndarray, vdots: np.ndarray) -> np.ndarray:
-    """The floors (B,), in units of u, of states q (B, nq) at rest with accelerations vdots (B, nv). Equal neighbours share their maps.
+    """Return the floors (B,), in units of u, of states q (B, nq) at rest with accelerations vdots (B, nv). Equal neighbours share their
+    maps.
 
     Cost O(N²) for the two dense maps of a state, O(N²) for each of its accelerations, in double precision.
     """
@@ -51,9 +52,9 @@ def floors(model: Any, q: np.ndarray, vdots: np.ndarray) -> np.ndarray:
 
 
 def _units(model: Any, q: np.ndarray, v: np.ndarray, vdots: np.ndarray, forces: float = 1.0, **binding: Any) -> np.ndarray:
-    """‖ |ℳ⁻¹HφMφ*| |α| + |ℳ⁻¹Hφ| (|M||α| + |f|) ‖ / ‖θ̈‖ (B,) for accelerations vdots (B, nv) at one state; 0 where all is zero.
+    """‖ |ℳ⁻¹HφMφ*| |α| + |ℳ⁻¹Hφ| (|M||α| + |f|) ‖ / ‖θ̈‖ (B,) for accelerations vdots (B, nv) at one state; 0 if all are zero.
 
-    forces : the unit of the forces over that of the motions, where they are gathered in a wider precision
+    forces : the unit of the forces over the unit of the motions, if forces are gathered in a wider precision
     """
     soa, n, count = model.soa, model._size, len(vdots)
     H, phi, M, J, a, b, a0 = soa("H phi M J a b gravity_base")

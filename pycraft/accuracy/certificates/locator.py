@@ -1,4 +1,4 @@
-"""Where digits went: the error of every D(k), and the condition of a square operator."""
+"""Locator of lost digits: the error of every D(k), and the condition of a square operator."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .certificate import HingeLoss
 
 
 def runs_articulated_sweep(expr: Any, request: str) -> bool:
-    """Whether the plan of what is evaluated has the sweep that makes P(k), D(k) and G(k).
+    """Return True if the evaluation plan contains the sweep that computes P(k), D(k) and G(k).
 
     Parameters
     ----------
     expr : an operator or scalar expression
-    request : of an operator, as in `plan`: "apply", "dense"; a scalar has its own
+    request : request of an operator, as in `plan`: "apply", "dense"; a scalar has its own
     """
     if isinstance(expr, _core.Scalar):
         if expr.operand is not None:
@@ -30,10 +30,10 @@ def runs_articulated_sweep(expr: Any, request: str) -> bool:
 
 
 def hinge_losses(source: _core.SkoSource, q: Any, v: Any, rung: Rung, reference: Any) -> Iterator[HingeLoss]:
-    """Relative error of each D(k), in the form and precision used, against the wider one: a locator of lost digits, and no proof.
+    """Return the relative error of each D(k), in the form and precision used, against the wider one: a locator of lost digits, not a proof.
 
-    The error of D(k) is ‖L⁻¹δD L⁻*‖₂ with D = LL*: of a hinge of several coordinates in different units, too. What a wrong D(k) does
-    to the result depends on the rest of the model; and digits may be lost in the other sweeps as well.
+    The error of D(k) is ‖L⁻¹δD L⁻*‖₂ with D = LL*, also for a hinge with coordinates in different units. The effect of a wrong D(k)
+    on the result depends on the rest of the model; and other sweeps may also lose digits.
     """
     D = source.symbol("D")
     sizes = [n for n in source.dof if n]
@@ -41,7 +41,7 @@ def hinge_losses(source: _core.SkoSource, q: Any, v: Any, rung: Rung, reference:
     if not sizes:
         return
     width = max(sizes)
-    ones = np.vstack([np.eye(n, width) for n in sizes])  # one column for all the first coordinates of hinges, one for all the second
+    ones = np.vstack([np.eye(n, width) for n in sizes])  # one column for all first coordinates of hinges, one for all second ones
     columns = D @ _core.constant(ones, _core.euclidean(width), D.domain, "1")
     used = columns.at(q, v, form=rung.form, precision=rung.precision).dense(dtype=object)
     exact = columns.at(q, v, form=EXACT, precision=reference).dense(dtype=object)
@@ -54,7 +54,7 @@ def hinge_losses(source: _core.SkoSource, q: Any, v: Any, rung: Rung, reference:
 
 
 def condition_estimate(operator: _core.Operator) -> float:
-    """1-norm condition number of a square operator, estimated from products and solves, none of them dense.
+    """Return an estimate of the 1-norm condition number of a square operator, from products and solves, none of them dense.
 
     SciPy's block 1-norm estimator (Higham and Tisseur 2000): a lower bound that is rarely off by more than a small factor.
     """

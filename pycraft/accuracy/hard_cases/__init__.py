@@ -1,1 +1,1 @@
-"""The catalogue of hard cases: mechanisms on which digits are lost, each with what every form and precision must keep of them."""
+"""The catalogue of hard cases: mechanisms that lose digits, each with bounds on the error of every form and precision."""

@@ -1,4 +1,4 @@
-"""A hard case, as data: what is hard, how a random instance is drawn, what is measured against what, which bounds hold.
+"""A hard case, as data: the difficulty, random instances, the measured error and its reference, and the bounds.
 
 A case draws its models, states and forces from a seed; nothing in it runs anything. `stability.py` runs the catalogue.
 """
@@ -42,7 +42,7 @@ REFINED_WIDER = {form: Rung(form, refine="auto", residual="wider").label for for
 
 SOLVED, REFUSED, EITHER = "solved", "refused", "either"
 SINGLE_MAY_REFUSE = {rung.label: EITHER for rung in RUNGS if rung.precision == "single"}
-"""Seven digits hold no more: single precision may refuse a hard case, not answer wildly."""
+"""Seven digits are too few: single precision may refuse a hard case, but must not return wild values."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class Sample:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a bound may use: errors (seeds,) of every method by its label, floors (seeds,) in units of u
-    (none where a case has no floor), the case's parameters, eps."""
+    """Data available to a bound: errors (seeds,) of every method by its label, floors (seeds,) in units of u
+    (none if a case has no floor), the case's parameters, eps."""
 
     parameters: Mapping[str, Any]
     eps: float
@@ -71,7 +71,7 @@ class Measured:
         return float(self.parameters["N"])
 
     def best_peer(self, share: float) -> float | None:
-        """The least of the peers' quantiles; None without a peer that answered."""
+        """Return the least of the peers' quantiles; None if no peer answered."""
         found = [quantile(self.errors[peer], share) for peer in self.peers if len(self.errors[peer])]
         return min(found) if found else None
 
@@ -80,8 +80,8 @@ class Measured:
 class Bound:
     """A bound on the errors of some methods.
 
-    `methods` are labels; `statistic` is "median", "p95" or "worst"; `limit(measured)` gives a number, one per seed, or None where the
-    bound does not apply; the bound holds where the statistic of error / limit is at most 1. `formula` says it in words.
+    `methods` are labels; `statistic` is "median", "p95" or "worst"; `limit(measured)` gives a number, one per seed, or None if the
+    bound does not apply; the bound holds if the statistic of error / limit is at most 1. `formula` states it in words.
     """
 
     methods: tuple[str, ...]
@@ -100,12 +100,12 @@ class DynamicsCase:
     parameters : dict, N the number of links
     draw : `draw(rng, states)` makes a Sample
     bounds : tuple of Bound
-    verdict : "solved" | "refused" | "either", for every method or by its label; "solved" where a label is missing
-    fault : the hinge that a refusal must name
-    floor : whether the floor of refinement is computed; the states must be at rest, without gravity
+    verdict : "solved" | "refused" | "either", for every method or by its label; default "solved"
+    fault : hinge that a refusal must name
+    floor : True if the floor of refinement is computed; the states must be at rest, without gravity
     rungs, extra : methods beyond the forms: further rungs, and functions of the sample by label
-    models : instances per run, among which the seeds are divided
-    peers : whether other packages take part
+    models : number of models per run, among which the seeds are divided
+    peers : True if other packages are measured
     """
 
     name: str
@@ -126,7 +126,7 @@ class DynamicsCase:
     reference: str = "quad"
 
     def expected(self, rung: Rung) -> str:
-        """The verdict for one rung."""
+        """Return the verdict for one rung."""
         return self.verdict if isinstance(self.verdict, str) else self.verdict.get(rung.label, SOLVED)
 
 
@@ -149,7 +149,7 @@ Case = DynamicsCase | MeasuredCase
 
 
 def quantile(errors: np.ndarray, share: float) -> float:
-    """A quantile that is one of the errors (the next larger one); infinite where it falls on a NaN."""
+    """Return a quantile that is one of the errors (the next larger one); infinite if it falls on a NaN."""
     if not len(errors):
         return float("nan")
     ordered = np.sort(np.where(np.isnan(errors), np.inf, errors))

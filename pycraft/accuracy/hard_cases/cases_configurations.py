@@ -1,4 +1,4 @@
-"""Configurations that are hard: coincident axes, rotations far from identity, quaternions of any length, many turns."""
+"""Hard configurations: coincident axes, rotations far from identity, quaternions of any length, many turns."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _draw_wrist(mass: float, rng: np.random.Generator, count: int) -> Sample:
 
 
 def _parallel(mass: float) -> DynamicsCase:
-    """Two pins on one line: the accelerations are those of the link between them and of their sum."""
+    """Two pins on one line: one acceleration for the link between them and one for their sum."""
     return DynamicsCase(
         f"two parallel pins at one point, link between them {mass:g} kg",
         FAMILY,

@@ -1,4 +1,4 @@
-"""What is eliminated over the tree, or asked of ℳ⁻¹ as a whole, in units where no number of the model is near one."""
+"""Elimination over the tree, and requests of ℳ⁻¹ as a whole, in units where no value of the model is near one."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ DIGITS = 50
 
 
 def cases() -> list[Case]:
-    hard = "the ones of the resolvents stand beside inertias of any size: what a pivot is compared with must not hang on the units"
+    hard = "the ones of the resolvents stand beside inertias of any size: what a pivot is compared with must not depend on the units"
     *others, Lambda = REQUESTS
     bounds = (
         at_most(tuple(others), "worst", "1e-12", 1e-12),

@@ -75,7 +75,7 @@ def cases() -> list[Case]:
 
 
 def _case(name: str, hard: str, quantity: str, measure: Callable[[Iterable[int], int], Errors], factor: float) -> MeasuredCase:
-    """The length of a large rotation vector is rounded, too: hence θ in the bound."""
+    """The length of a large rotation vector is also rounded: hence θ in the bound."""
     bounds = tuple(
         Bound((_label(angle),), "worst", f"{factor:g} (1 + θ) eps" if angle >= 1 else f"{factor:g} eps", partial(_limit, factor, angle))
         for angle in measure.args[0]  # type: ignore[attr-defined]  # a partial's

@@ -1,5 +1,5 @@
 """Accelerations on loops, by tree augmentation and by constraint embedding: near singular states, with heavy and light rods, with rows that
-hang together or nearly so, in long loops, and where loops close at once."""
+are dependent or nearly so, in long loops, and where loops close at once."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def _ratios() -> list[MeasuredCase]:
 
 
 def _of_ratios(methods: tuple[str, ...], factor: float, apart: Callable[[Measured], float], of: str = "eps") -> tuple[Bound, ...]:
-    """What is lost to ratios; the worst are those whose forces nearly cancel, so that little is left to be right of."""
+    """Bounds on the loss by ratios; it is worst for forces that nearly cancel, with small accelerations."""
 
     def limit(times: float, measured: Measured) -> float:
         eps = measured.eps if of == "eps" else float(np.finfo(np.longdouble).eps)
@@ -290,7 +290,7 @@ def _bricard_errors(rng: np.random.Generator) -> dict[str, float]:
 
 
 def _long() -> list[MeasuredCase]:
-    """What is lost grows as the square of the rungs, by either way and every form, in units of the precision of residuals."""
+    """The loss grows as the square of the number of rungs, by both methods and all forms, in units of the precision of residuals."""
     return [
         _case(
             f"ladder of {rungs} rungs",

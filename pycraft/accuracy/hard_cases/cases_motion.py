@@ -1,4 +1,4 @@
-"""Systems that travel fast or are far away: what all bodies have in common must not cost the digits of what they have not."""
+"""Systems that travel fast or are far away: the motion common to all bodies must not cost digits of the relative motion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FACTORED = ("ud", "square-root")
 
 def cases() -> list[Case]:
     travels = "m|v|² is 10¹¹ J beside joints of a few N m: no velocity term may contain the common velocity"
-    light = "forces of the tip, differentiated first, hide those of the links"
+    light = "forces of the tip, differentiated first, hide forces of the links"
     return [
         _case(
             f"2 t bus with links of 50 g at {SPEED:g} m/s",

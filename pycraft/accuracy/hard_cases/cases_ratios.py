@@ -22,7 +22,7 @@ REFINABLE, BOUNDED = 1e9, 1e12
 """Ratios up to which one refinement repairs `fast`, and up to which unrefined `ud` has a bound."""
 
 DENSE = tuple(Rung(method=method) for method in ("cholesky", "ldl"))
-"""What a dense factorization of ℳ makes of these, for comparison: no bound."""
+"""Dense factorizations of ℳ for comparison, without bounds."""
 
 
 def _as_fast(measured: Measured) -> float | None:

@@ -1,8 +1,8 @@
-"""Where a residual knows less than the value that it is to correct; and factors whose D has digits when G has none.
+"""Residuals less accurate than the value that they should correct; and factors with an accurate D but an inaccurate G.
 
-A satellite's bus moves at kilometres a second with links of grams on it, and forces that cancel leave next to no acceleration: what
-refinement makes of a value may not be worse than the value. A thin rod askew on a ball hinge has an inertia about itself that vanishes
-beside mc²: right, or refused.
+A satellite's bus moves at kilometres per second with links of grams on it, and cancelling forces leave almost no acceleration:
+refinement must not make the value worse. A thin rod askew on a ball hinge has an inertia about itself that vanishes
+relative to mc²: the answer must be accurate, or refused.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Long trajectories: what must stay, stays; and published and exact motions."""
+"""Long trajectories: conserved quantities, and published and exact motions."""
 
 from __future__ import annotations
 
@@ -352,7 +352,7 @@ def _stiff() -> list[Case]:
         ),
         _case(
             "stiff damping, steps a thousand times too long",
-            "an explicit method with fixed steps blows up, and must say so",
+            "an explicit method with fixed steps blows up, and must raise",
             "0 where it raises",
             "an error that names the time",
             _blown_up,

@@ -1,4 +1,4 @@
-"""The catalogue of hard cases: every file of cases there is."""
+"""The catalogue of hard cases, from all files of cases."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SIZES = (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
 
 
 def catalogue(sizes: Iterable[int] = SIZES) -> list[Case]:
-    """Every case, the chains with these numbers of links; other cases larger than the largest are left out."""
+    """Return all cases, with chains of these numbers of links; other cases larger than the largest are omitted."""
     from . import (
         cases_chains,
         cases_closures,

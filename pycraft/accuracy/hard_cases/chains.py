@@ -1,4 +1,4 @@
-"""Chains for the hard cases. Inertias are exactly symmetric: one rounding error of asymmetry would be all that is measured."""
+"""Chains for the hard cases. Inertias are exactly symmetric: otherwise a rounding error of asymmetry would dominate the measurement."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SHAPE = np.array([[0.2, 0.01, 0.0], [0.01, 0.18, 0.01], [0.0, 0.01, 0.08]])
 """A link's inertia about its centre of mass, in units of its mass times its length squared."""
 
 OFFSET, CENTRE = np.array([0.2, 0.1, 1.0]), np.array([0.1, 0.05, 0.5])
-"""Where the next hinge and the centre of mass are, in units of the length."""
+"""Places of the next hinge and of the centre of mass, in units of the length."""
 
 
 def links(masses: Sequence[float], lengths: Sequence[float], rng: np.random.Generator, axes: str = "random") -> Multibody:
@@ -55,7 +55,7 @@ def direction(rng: np.random.Generator) -> np.ndarray:
 
 
 def wrist(mass: float, rng: np.random.Generator) -> Multibody:
-    """Six pins, the last three axes through a point, the fourth and sixth in one line at q[4] = 0; the link between them of that mass."""
+    """Six pins, the last three axes through a point, the fourth and sixth in one line at q[4] = 0; that mass between them."""
     model = Multibody("arm with a spherical wrist")
     skew = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     axes = [skew @ axis for axis in np.array([(0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0)], float)]

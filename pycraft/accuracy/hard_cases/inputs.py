@@ -1,4 +1,4 @@
-"""What a certificate is of: the coordinates, velocities, forces and vectors that are given, checked, and moved in their last place."""
+"""Inputs of a certificate: coordinates, velocities, forces and vectors, checked, and moved in their last place."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from ..exact import relative_error
 from ..rungs import epsilon
 
 DRAWS = 4
-"""Draws of signs for the error that rounded data make; the largest counts."""
+"""Number of random signs for the effect of rounded data; the largest effect counts."""
 
 ARTICULATED = {"method": "articulated", "on_singular": "raise"}
-"""Keywords of `forward_dynamics` that a certificate leaves as they are."""
+"""Keywords of `forward_dynamics` that a certificate does not change."""
 
 Data = dict[str, np.ndarray]
 """Arrays by name: q (nq,), v (nv,), tau (nv,), x (n,) or (n, m)."""
 
 
 def vector(model: Any, name: str, value: Any, size: int) -> np.ndarray:
-    """`value` as an array (size,); ModelError where it has another shape, or is no array of finite numbers."""
+    """Return `value` as an array (size,). Raises ModelError for another shape, or values that are not finite."""
     out = _numbers(name, f"{model.name!r}", value, f"{size} numbers")
     if out.shape != (size,):
         takes = f"takes {size} numbers, not an array {out.shape}"
-        raise _core.ModelError(f"a certificate is of one state: {name} of {model.name!r} {takes}")
+        raise _core.ModelError(f"a certificate takes one state: {name} of {model.name!r} {takes}")
     return out
 
 
 def applied_to(expr: Any, x: Any) -> np.ndarray:
-    """`x` as an array (n,) or (n, m) that the operator takes; ModelError where it has another shape."""
+    """Return `x` as an array (n,) or (n, m) for the operator. Raises ModelError for another shape."""
     n = expr.shape[1]
     takes = f"({n},), or ({n}, m) for m columns"
     out = _numbers("x", expr.text(), x, takes)
@@ -41,34 +41,34 @@ def applied_to(expr: Any, x: Any) -> np.ndarray:
 
 
 def check(seed: Any, **others: Any) -> None:
-    """EvaluationError where the seed is no seed, or a keyword asks for a method that has no certificate."""
+    """Raise EvaluationError for an invalid seed, or for a method without certificates."""
     if not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise _core.EvaluationError(f"seed={seed!r}: the seed of the signs is a whole number, 0 or above")
+        raise _core.EvaluationError(f"seed={seed!r}: the seed must be a whole number, 0 or above")
     for name, value in others.items():
         if value != ARTICULATED[name]:
-            instead = "pc.accuracy(model, methods=[...]) measures the others" if name == "method" else "a value that it refuses has none"
-            raise _core.EvaluationError(f"{name}={value!r}: certificates are of the articulated method; {instead}")
+            instead = "pc.accuracy(model, methods=[...]) measures the others" if name == "method" else "a refused value has no certificate"
+            raise _core.EvaluationError(f"{name}={value!r}: certificates support only the articulated method; {instead}")
 
 
 def check_coordinates(model: Any) -> None:
-    """ModelError where a model has no coordinates."""
+    """Raise ModelError for a model without coordinates."""
     if not model.nv:
         raise _core.ModelError(f"model {model.name!r} has no coordinates: nothing to certify")
 
 
 def input_errors(data: Data, seed: int, truth: Any, exact: Callable[[Data], Any]) -> dict[str, float]:
-    """The value's relative change when all numbers of one array move by half a unit in their last place, of each array.
+    """Return for each array the value's relative change when all its entries move by half a unit in their last place.
 
-    Half a unit is no double: numbers move by a whole one, and the change, small against the value, is halved. A coordinate that is 0 has
-    no last place, and an angle or a travel is rarely exact there: it moves by half an epsilon of 1 rad or 1 m. A zero of v, tau or x
-    stays: it says that nothing moves and nothing pushes.
+    Half a unit is not representable: entries move by a whole unit, and the change, small against the value, is halved. A coordinate of 0
+    has no last place, and an angle or a travel is rarely exact there: it moves by half an epsilon of 1 rad or 1 m. A zero of v, tau or x
+    does not change: it means that nothing moves and nothing pushes.
 
     Parameters
     ----------
     data : the arrays by name
-    seed : of the signs
-    truth : the value at `data`, as `exact` gives it
-    exact : the value of other data
+    seed : seed of the signs
+    truth : the value at `data`, as computed by `exact`
+    exact : function that computes the value at other data
     """
     rng = np.random.default_rng(seed)
     found = {}

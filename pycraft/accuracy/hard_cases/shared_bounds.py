@@ -18,13 +18,13 @@ UD_UNREFINED = (
     Bound(("ud",), "p95", "100 eps √N", _times_root(100)),
     Bound(("ud",), "worst", "1e-12", lambda m: 1e-12),
 )
-"""Unrefined `ud` does not feel mass ratios."""
+"""Unrefined `ud` is independent of mass ratios."""
 
 REFINED_FLOOR = (Bound(("fast + 1 refinement",), "worst", "10 × the floor, or 1e-11", lambda m: np.maximum(5 * m.floors * m.eps, 1e-11)),)
-"""The same where the floor of refinement is above that."""
+"""The same if the floor of refinement is larger."""
 
 UD_FLOOR = (Bound(("ud",), "worst", "10 × the floor, or 100 eps √N", lambda m: np.maximum(5 * m.floors * m.eps, _times_root(100)(m))),)
-"""Unrefined `ud` where the floor of refinement is above rounding."""
+"""Unrefined `ud` if the floor of refinement is above rounding."""
 
 FAST_REFINED = (Bound(("fast + 1 refinement",), "worst", "1e-11", lambda m: 1e-11),)
 """One refinement of `fast` repairs ratios up to 1e9."""
@@ -46,7 +46,7 @@ ROUNDING = (
     Bound(EVERY_DOUBLE, "worst", "1e-12", lambda m: 1e-12),
     *WITHIN_PEERS,
 )
-"""What is not hard for any form stays at rounding, as it does elsewhere."""
+"""Cases that are not hard for any form stay at rounding level."""
 
 
 def _three_hundredth(form: str, measured: Measured) -> np.ndarray | None:
@@ -80,5 +80,5 @@ FLOOR = (ONE, WIDER, GATHER) + tuple(
 
 
 def at_most(methods: tuple[str, ...], statistic: str, formula: str, value: float) -> Bound:
-    """A bound that is a number."""
+    """Return a bound with a fixed limit."""
     return Bound(methods, statistic, formula, lambda m: value)

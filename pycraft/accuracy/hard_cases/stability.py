@@ -1,7 +1,7 @@
-"""Runs the catalogue of hard cases over forms, refinements and precisions, with the installed peers side by side.
+"""Run the catalogue of hard cases over forms, refinements and precisions, alongside the installed peers.
 
-An error is relative, in the 2-norm, against quad precision. A method that raises has refused: no error, but it must have been expected.
-Of our own methods none may return a NaN in silence, whatever the case, nor in double precision or wider an error above one.
+An error is relative, in the 2-norm, against quad precision. A method that raises has refused: it has no error, but the refusal must be
+expected. None of our own methods may return a NaN in any case, nor an error above one in double precision or wider.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from .catalogue import SIZES, catalogue
 from .stability_table import Stability, row
 
 WILD = 1.0
-"""A relative error above which a value is no value."""
+"""Relative error above which a value is wild."""
 
 
 @dataclass
 class Outcome:
-    """What one method did: errors (seeds,), NaN where it refused and infinite where it returned a NaN; the refusals' texts."""
+    """Outcome of one method: errors (seeds,), NaN where it refused and infinite where it returned a NaN; texts of refusals."""
 
     errors: np.ndarray
     refusals: list[str] = field(default_factory=list)
@@ -37,7 +37,7 @@ class Outcome:
 
     @property
     def answered(self) -> np.ndarray:
-        """The errors of the seeds that were answered."""
+        """Errors of the answered seeds."""
         return self.errors[~np.isnan(self.errors)]
 
 
@@ -53,16 +53,16 @@ def run(
 
     Parameters
     ----------
-    seeds : random instances a case
-    steps : of each trajectory, at most
+    seeds : random instances per case
+    steps : largest number of steps of each trajectory
     sizes : numbers of links of the uniform chains; see `catalogue`
-    peers : whether installed packages are measured beside
+    peers : True also measures installed packages
     progress : called with the name of each case
 
     Returns
     -------
     Stability
-        Tidy rows, one a case and method; true where every bound holds.
+        Tidy rows, one per case and method; true if every bound holds.
     """
     makers = _makers() if peers else {}
     rows: list[dict[str, Any]] = []
@@ -74,7 +74,7 @@ def run(
 
 
 def _makers() -> dict[str, Any]:
-    """What makes a peer of a model, by name and version."""
+    """Return constructors of peers from a model, by name and version."""
     from ...interop.export import installed
 
     benign = chain(1, seed=0)
@@ -123,12 +123,12 @@ def _samples(case: DynamicsCase, seeds: int) -> Iterable[Sample]:
 
 
 def _options(rung: Rung) -> dict[str, Any]:
-    """The keywords of a rung that say something."""
+    """Return the keywords of a rung that differ from the defaults."""
     return {name: value for name, value in rung.options.items() if value != getattr(Rung(), name)}
 
 
 def exists(rung: Rung) -> bool:
-    """Whether this build has a rung: precisions depend on the platform."""
+    """Return True if this build has a rung: precisions depend on the platform."""
     try:
         chain(1).forward_dynamics(np.zeros(1), np.zeros(1), np.ones(1), **_options(rung))
     except (TypeError, _core.EvaluationError):
@@ -137,7 +137,8 @@ def exists(rung: Rung) -> bool:
 
 
 def _reference(sample: Sample) -> np.ndarray:
-    """Accelerations (B, nv) in quad precision, in 100 digits where it refuses, NaN where both do; in the form whose error does not grow
+    """Return accelerations (B, nv) in quad precision, in 100 digits where quad refuses, NaN where both do; by the form with an error that
+    does not grow
     with the mass ratio."""
     exact = _each(sample, lambda s: s.model.forward_dynamics(s.q, s.v, s.tau, form=EXACT, precision="quad"), [])
     for i in np.flatnonzero(np.isnan(exact).any(axis=1)):
@@ -147,7 +148,7 @@ def _reference(sample: Sample) -> np.ndarray:
 
 
 def _each(sample: Sample, way: Callable[[Sample], np.ndarray], refusals: list[str]) -> np.ndarray:
-    """All states in one call; where that refuses, state by state, with NaN and a text for each that is refused."""
+    """Compute all states in one call; if that refuses, state by state, with NaN and a text for each refused state."""
     try:
         return way(sample)
     except _core.Error:
@@ -162,7 +163,7 @@ def _each(sample: Sample, way: Callable[[Sample], np.ndarray], refusals: list[st
 
 
 def _collect(samples: list[Sample], exact: list[np.ndarray], way: Callable[[Sample], np.ndarray]) -> Outcome:
-    """One of our methods on all samples."""
+    """Measure one of our methods on all samples."""
     refusals: list[str] = []
     parts, returned = [], 0.0
     for sample, expected in zip(samples, exact, strict=True):
@@ -175,7 +176,7 @@ def _collect(samples: list[Sample], exact: list[np.ndarray], way: Callable[[Samp
 
 
 def relative(value: np.ndarray, exact: np.ndarray) -> np.ndarray:
-    """Relative errors (B,) in the 2-norm of rows; infinite where a value or the reference is not finite."""
+    """Return relative errors (B,) in the 2-norm of rows; infinite where a value or the reference is not finite."""
     scale = np.abs(exact).max(axis=-1, keepdims=True, initial=0.0)
     scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
     with np.errstate(all="ignore"):
@@ -185,12 +186,12 @@ def relative(value: np.ndarray, exact: np.ndarray) -> np.ndarray:
 
 
 def _largest(value: np.ndarray) -> float:
-    """The largest magnitude returned, NaN where there is one."""
+    """Return the largest returned magnitude, NaN if any is NaN."""
     return float(np.abs(value).max()) if value.size else 0.0
 
 
 def _peer(make: Any, samples: list[Sample], exact: list[np.ndarray]) -> Outcome:
-    """Another package on the same samples; what it refuses, in its words."""
+    """Measure another package on the same samples; its refusals keep their own text."""
     from ...interop.peer import PeerRefusal
 
     parts, refusals, returned = [], [], 0.0
@@ -230,7 +231,7 @@ def _measured(case: MeasuredCase, seeds: int, steps: int) -> list[dict[str, Any]
 
 
 def _judge(case: Case, label: str, rung: Rung | None, outcome: Outcome, measured: Measured, peer: bool) -> dict[str, Any]:
-    """The row of one method: statistics, the bounds that apply to it and what failed."""
+    """Return the row of one method: statistics, the bounds that apply, and failures."""
     formulas, failed, ratio = [], [], 0.0
     for bound in case.bounds:
         if peer or label not in bound.methods:
@@ -252,7 +253,7 @@ def _judge(case: Case, label: str, rung: Rung | None, outcome: Outcome, measured
 
 
 def ratio_to(bound: Bound, errors: np.ndarray, measured: Measured) -> float | None:
-    """The statistic of error over limit; None where the bound does not apply or nothing was answered."""
+    """Return the statistic of error over limit; None if the bound does not apply or nothing was answered."""
     limit = bound.limit(measured)
     if limit is None:
         return None
@@ -265,9 +266,9 @@ def ratio_to(bound: Bound, errors: np.ndarray, measured: Measured) -> float | No
 
 
 def _unexpected(case: DynamicsCase, rung: Rung | None, outcome: Outcome) -> list[str]:
-    """What must not happen: a value in place of a refusal, a refusal in place of a value, the wrong hinge, a wild value.
+    """Return violations: a value instead of a refusal, a refusal instead of a value, the wrong hinge, a wild value.
 
-    Seven digits are less than some of these problems need; there a wild value is a row of the table, and a NaN is not.
+    Seven digits are too few for some of these problems; in single precision a wild value is allowed, and a NaN is not.
     """
     expected = case.expected(rung) if rung else EITHER
     found = []

@@ -1,4 +1,4 @@
-"""A run of the hard cases as Markdown: the table that is committed. Every row with its three statistics is in the JSON and CSV files."""
+"""A run of the hard cases as Markdown: the committed table. The JSON and CSV files hold every row with its three statistics."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Row = dict[str, Any]
 
 
 def markdown(results: Stability) -> str:
-    """The whole run: what does not hold first; then, a family at a time, the cases with their bounds, and the errors side by side."""
+    """Return the whole run: violated bounds first; then, family by family, the cases with their bounds, and the errors side by side."""
     cases, seeds, steps = _of(results, "case"), results.about.get("seeds"), results.about.get("steps")
     lines = [
         "# Hard cases",
@@ -38,12 +38,12 @@ def markdown(results: Stability) -> str:
 
 
 def _of(rows: Any, key: str) -> list[Any]:
-    """The different values of a column, in order."""
+    """Return the different values of a column, in order."""
     return list(dict.fromkeys(row[key] for row in rows))
 
 
 def _together(pairs: Iterable[tuple[Any, str]]) -> dict[Any, list[str]]:
-    """The different second entries of each first one, in order."""
+    """Return the different second entries of each first one, in order."""
     found: dict[Any, list[str]] = {}
     for key, value in pairs:
         if value not in found.setdefault(key, []):
@@ -69,7 +69,7 @@ def _sentence(row: Row) -> str:
 
 
 def _bounds(rows: list[Row]) -> str:
-    """Each bound with the methods that it applies to."""
+    """Return each bound with its methods."""
     methods = _together((bound, row["method"]) for row in rows for bound in filter(None, row["bound"].split("; ")))
     grouped = _together(((_group(own), bound.split(" ≤ ")[1]), bound.split(" ≤ ")[0]) for bound, own in methods.items())
     return (
@@ -78,14 +78,14 @@ def _bounds(rows: list[Row]) -> str:
 
 
 def _group(methods: list[str]) -> str:
-    """The methods by a common name, where they have one."""
+    """Return the methods by a common name, if they have one."""
     if set(EVERY_DOUBLE) <= set(methods) or len(methods) > 4:
         return "all"
     return "refined by a wider residual" if set(methods) == set(REFINED_WIDER.values()) else ", ".join(methods)
 
 
 def _side_by_side(rows: list[Row]) -> list[str]:
-    """Cases down, methods across."""
+    """Return a table with cases down and methods across."""
     if not rows:
         return []
     methods = _of(rows, "method")
@@ -109,7 +109,7 @@ def _cell(row: Row | None) -> str:
 
 
 def _listed(rows: list[Row]) -> list[str]:
-    """Cases whose methods are their own: a line each."""
+    """Return cases with their own methods: a line each."""
     if not rows:
         return []
     lines = ["| case | quantity | reference | method | 95 % (worst) |", "|---|---|---|---|---|"]
@@ -119,7 +119,7 @@ def _listed(rows: list[Row]) -> list[str]:
 
 
 def _texts(rows: list[Row]) -> list[str]:
-    """What was said, with the cases: refusals, warnings of other packages, and what was returned where nothing should be."""
+    """Return messages with their cases: refusals, warnings of other packages, and values returned instead of refusals."""
     said = _together(((row["case"], _shortened(row)), row["method"]) for row in rows if _speaks(row))
     speakers = _together(((_speaker(methods), text), case) for (case, text), methods in said.items())
     lines = [f"- {who}: {text} — {'; '.join(cases)}" for (who, text), cases in speakers.items()]
@@ -135,7 +135,7 @@ def _speaker(methods: list[str]) -> str:
 
 
 def _shortened(row: Row) -> str:
-    """A text without what differs from one instance to the next: pivots, places in a file, and the hinge where none had to be named."""
+    """Return a text without parts that differ between instances: pivots, places in a file, and the hinge if none had to be named."""
     text = re.sub(r" \((D|pivot) [^)]*\)", "", row["text"].split(" Element name")[0])
     if not row["fault"]:
         text = re.sub(r"(SingularHingeError: )hinge '[^']*' of body '[^']*' feels no inertia along coordinate '[^']*'.*", r"\1", text)

@@ -19,8 +19,8 @@ COLUMNS = (
 def row(
     case: Case, label: str, rung: Rung | None, outcome: Any, bounds: list[str], ratio: float, failed: list[str], text: str, peer: bool
 ) -> dict[str, Any]:
-    """One method in one case. `ratio` is the largest ratio to a bound; `failed` names the bounds that do not hold, `fault` the hinge
-    that a refusal must name."""
+    """Return the row of one method in one case. `ratio` is the largest ratio to a bound; `failed` names the violated bounds, `fault` the
+    hinge that a refusal must name."""
     answered = outcome.answered
     statistics = {"median": 0.5, "p95": 0.95, "worst": 1.0}
     values = {name: quantile(answered, share) if len(answered) else None for name, share in statistics.items()}
@@ -48,7 +48,7 @@ def row(
 
 
 class Stability(TidyTable):
-    """Rows of a run, true where every bound holds, and there is one. The committed table: `stability_markdown.py`."""
+    """Rows of a run, true if there are bounds and all hold. The committed table: `stability_markdown.py`."""
 
     columns: ClassVar[tuple[str, ...]] = COLUMNS
     shown: ClassVar[dict[str, str]] = {
@@ -67,11 +67,11 @@ class Stability(TidyTable):
 
     @property
     def failures(self) -> list[dict[str, Any]]:
-        """The rows with a bound that does not hold."""
+        """Rows with a violated bound."""
         return [row for row in self.rows if not row["passed"]]
 
     def of(self, case: str, method: str) -> dict[str, Any]:
-        """The row of one method in one case."""
+        """Return the row of one method in one case."""
         return next(row for row in self.rows if (row["case"], row["method"]) == (case, method))
 
     def cell(self, key: str, row: dict[str, Any]) -> str:
@@ -92,5 +92,5 @@ class Stability(TidyTable):
 
 
 def number(value: float | None) -> str:
-    """An error in two figures; a NaN that was returned counts as an infinite error."""
+    """Return an error in two digits; a returned NaN counts as an infinite error."""
     return "0" if value == 0 else "NaN" if value is not None and np.isinf(value) else error_text(value)

@@ -1,1 +1,1 @@
-"""What accuracy costs in time, as tables and pictures: ways of computing forward dynamics, work and precision of integration."""
+"""Cost of accuracy, as tables and pictures: ways of computing forward dynamics, work and precision of integration."""

@@ -1,4 +1,4 @@
-"""Whether the reference of an accuracy table is confirmed by a method of another family."""
+"""Confirmation of the reference of an accuracy table by a method of another family."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from ... import _core
 from ...models.warning import warn
 
 SECOND = "bulirsch-stoer"
-"""The second method: extrapolation of the midpoint rule, whose estimate and coefficients share nothing with a Runge-Kutta pair."""
+"""The second method: extrapolation of the midpoint rule, with an estimate and coefficients unrelated to a Runge-Kutta pair."""
 ENOUGH = 6
-"""Digits in which both must agree: below that a reference is not confirmed."""
+"""Least number of digits in which both must agree to confirm a reference."""
 
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What a second method says of a reference.
+    """Comparison of a reference with a second method.
 
     Attributes
     ----------
     by : the second method, in words
-    distance : rad, m, of both motions, measured as errors are; None where the second method gave no motion
-    digits : to which both agree, relative to the largest displacement of the motion
+    distance : rad, m, between both motions, measured like errors; None if the second method gave no motion
+    digits : number of digits to which both agree, relative to the largest displacement of the motion
     refused : why the second method gave no motion
     """
 
@@ -50,13 +50,13 @@ class Confirmation:
 def confirmation(
     truth: np.ndarray, second: Callable[[], np.ndarray], distance: Callable[[np.ndarray, np.ndarray], float], by: str
 ) -> Confirmation:
-    """Compare a reference with the motion that a second method finds; a ModelWarning where they do not agree.
+    """Compare a reference with the motion of a second method; warn (ModelWarning) if they do not agree.
 
     Parameters
     ----------
-    truth : (T, nq), the reference at the times where motions are compared, the start first
-    second : computes the same by the second method
-    distance : of two such motions, rad, m
+    truth : (T, nq), the reference at the times of comparison, the start first
+    second : function that computes the same by the second method
+    distance : function that returns the distance of two such motions, rad, m
     """
     try:
         other = second()
@@ -67,12 +67,12 @@ def confirmation(
         size = distance(np.broadcast_to(truth[:1], truth.shape), truth)
         found = Confirmation(by, apart, _digits(apart, size))
     if not found.confirmed:
-        warn(f"the reference is {found.text.replace('NOT CONFIRMED', 'not confirmed', 1)}: errors below that distance say nothing")
+        warn(f"the reference is {found.text.replace('NOT CONFIRMED', 'not confirmed', 1)}: errors below that distance are meaningless")
     return found
 
 
 def _digits(apart: float, size: float) -> int:
-    """Decimal digits in which two motions agree, none of which is beyond double precision."""
+    """Return the number of decimal digits in which two motions agree, at most the digits of a double."""
     if not np.isfinite(apart):
         return 0
     most = 16
@@ -80,10 +80,10 @@ def _digits(apart: float, size: float) -> int:
 
 
 def own_error(looser: float, found: Confirmation) -> float:
-    """Of the reference: its distance to a looser run, and to the second method's."""
+    """Return the error of the reference: the larger of its distances to a looser run and to the second method's."""
     return max(looser, found.distance or 0.0)
 
 
 def about(found: Confirmation) -> dict[str, Any]:
-    """What a table keeps of it."""
+    """Return the data for a table."""
     return {"confirmed_by": found.by, "confirmed_digits": found.digits if found.confirmed else 0, "confirmation": found.text}

@@ -1,4 +1,4 @@
-"""Colours, and the pictures of accuracy: labels that keep clear of points and of each other."""
+"""Colours, and the pictures of accuracy, with labels that avoid points and each other."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 
 COLOURS = {"single": "#8a8a8a", "double": "#1f4e79", "extended": "#c55a11", "quad": "#4d7c2a"}
-"""Of precisions; others take WIDE."""
+"""Colours of precisions; others use WIDE."""
 WIDE = "#6b3fa0"
 MARKERS = {"fast": "o", "ud": "s", "square-root": "D"}
 OTHERS = {"cholesky": "^", "ldl": "v", "conjugate-gradients": "P", "inverse": "X", "divide-and-conquer": "d", "realization": "*"}
 SERIES = ("#1f4e79", "#c55a11", "#4d7c2a", "#6b3fa0", "#8a8a8a", "#a8324a", "#2a9d8f", "#b8860b")
-"""Of series that have no colour of their own."""
+"""Colours of series without their own colour."""
 WORTH = 3.0
-"""Points of a Pareto front are named where the error falls by this factor: less is the luck of a state."""
+"""Points of a Pareto front are labelled if the error falls by this factor: smaller changes are chance."""
 RING: dict[str, Any] = {"marker": "o", "ls": "", "ms": 11, "mfc": "none", "mec": "k", "mew": 0.8}
-"""Around the points of a Pareto front."""
+"""Marker around the points of a Pareto front."""
 BELOW = 0.5
-"""Errors of zero are drawn this factor below the smallest one that is not."""
+"""Errors of zero are drawn at the smallest nonzero error times this factor."""
 
 
 def axes_of(ax: Any, size: tuple[float, float] = (6.4, 4.0)) -> Any:
-    """The axes given, or new ones."""
+    """Return the given axes, or new ones."""
     if ax is not None:
         return ax
     import matplotlib.pyplot as plt
@@ -33,14 +33,14 @@ def axes_of(ax: Any, size: tuple[float, float] = (6.4, 4.0)) -> Any:
 
 
 def above_zero(errors: Iterable[float]) -> np.ndarray:
-    """Errors for a logarithmic axis: an exact zero goes a little below the smallest error there is."""
+    """Return errors for a logarithmic axis: an exact zero is placed slightly below the smallest error."""
     errors = np.asarray(list(errors), float)
     positive = errors[errors > 0]
     return np.where(errors > 0, errors, BELOW * (positive.min() if positive.size else 1e-17))
 
 
 def time_axis(axis: Any) -> None:
-    """Ticks of a time axis with their units."""
+    """Set ticks of a time axis with their units."""
     from matplotlib.ticker import FuncFormatter
 
     def text(seconds: float, _: int) -> str:
@@ -62,7 +62,7 @@ def place_labels(
 ) -> None:
     """Write a label beside each point (x, y, text): at the nearest place that covers neither another label nor a point.
 
-    What is not right beside its point gets a line to it; that line passes no other of the `markers`.
+    A label away from its point gets a line to it, which avoids the other `markers`.
     """
     figure = ax.figure
     figure.canvas.draw()
@@ -99,26 +99,26 @@ def place_labels(
         arrow = {"arrowstyle": "-", "lw": 0.6, "color": "0.35", "shrinkA": 0, "shrinkB": 5, "relpos": (float(ha == "right"), float(dy < 0))}
         ax.annotate(text, (x, y), (dx, dy), textcoords="offset points", ha=ha, va=va, fontsize=size, arrowprops=arrow if far else None)
         taken.append(best[2])
-        if far:  # later labels keep clear of this line
+        if far:  # later labels avoid this line
             points += list(np.linspace(best[4], at, 12))
 
 
 def _grown(box: Any, across: float, up: float) -> Any:
-    """A box with a margin."""
+    """Return a box with a margin."""
     from matplotlib.transforms import Bbox
 
     return Bbox.from_extents(box.x0 - across, box.y0 - up, box.x1 + across, box.y1 + up)
 
 
 def _between(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> float:
-    """Distance of a point from the line between two others."""
+    """Return the distance of a point from the line between two others."""
     along = end - start
     share = np.clip(np.dot(point - start, along) / max(float(np.dot(along, along)), 1e-12), 0.0, 1.0)
     return float(np.hypot(*(point - start - share * along)))
 
 
 def no_picture(axes: Any, table: Any) -> None:
-    """In place of an empty frame: that everything is refused, and why."""
+    """Write, instead of an empty frame, that everything is refused, and why."""
     reasons = [fill(reason, 70) for reason in list(table.refusals)[:3]]
     if len(table.refusals) > 3:
         reasons.append(f"and {len(table.refusals) - 3} more reasons: see .refusals")
@@ -129,7 +129,7 @@ def no_picture(axes: Any, table: Any) -> None:
 
 
 def _places() -> list[tuple[float, float, str, str]]:
-    """Offsets in points with their alignment, nearest first."""
+    """Yield offsets in points with their alignment, nearest first."""
     sides = [(6, "left"), (-6, "right")]
     places = [
         (float(x * across), float(up), align, "center")
@@ -142,9 +142,10 @@ def _places() -> list[tuple[float, float, str, str]]:
 
 
 def accuracy_plot(table: Any, ax: Any = None) -> Any:
-    """Error against time: colour the precision, marker the form or method, filled where refined, half with a wider residual or gather.
+    """Plot error against time: colour for precision, marker for form or method, filled if refined, half filled with a wider residual or
+    gather.
 
-    The Pareto front is drawn, its points ringed, its steps named.
+    The Pareto front is drawn, with rings around its points and labels at its steps.
     """
     from matplotlib.lines import Line2D
 
@@ -190,7 +191,7 @@ def accuracy_plot(table: Any, ax: Any = None) -> Any:
 
 
 def _filling(refine: Any, residual: str, colour: str) -> dict[str, Any]:
-    """Of a marker: hollow unrefined, filled refined, half filled with a wider residual, its left half with a wide gather."""
+    """Return the filling of a marker: hollow unrefined, filled refined, half filled with a wider residual, left half with a wide gather."""
     if not refine:
         return {"mfc": "none"}
     half = {"gather": "left", "wider": "bottom"}.get(residual)
@@ -198,7 +199,7 @@ def _filling(refine: Any, residual: str, colour: str) -> dict[str, Any]:
 
 
 def _steps(front: list[tuple[float, float, dict[str, Any]]]) -> list[tuple[float, float, dict[str, Any]]]:
-    """Of a front, fastest first, what is worth a name: where the error has fallen by WORTH since the last named."""
+    """Return the points of a front, fastest first, to label: where the error has fallen by WORTH since the last label."""
     named: list[tuple[float, float, dict[str, Any]]] = []
     for point in front:
         if not named or WORTH * point[1] <= named[-1][1]:
@@ -207,7 +208,7 @@ def _steps(front: list[tuple[float, float, dict[str, Any]]]) -> list[tuple[float
 
 
 def along_front(front: list[tuple[float, float, dict[str, Any]]], count: int = 24) -> list[tuple[float, float]]:
-    """Points along the line of a front, to keep labels off it."""
+    """Return points along the line of a front, which labels avoid."""
     points: list[tuple[float, float]] = []
     for (x, y, _), (next_x, next_y, _) in zip(front, front[1:], strict=False):
         points += [(float(t), y) for t in np.geomspace(x, next_x, count)] + [(next_x, float(e)) for e in np.geomspace(y, next_y, count)]
@@ -231,7 +232,7 @@ def _label(row: dict[str, Any]) -> str:
 
 
 def work_precision_plot(table: Any, axes: Any = None) -> Any:
-    """Two panels: error of the trajectory, drift of the energy, each against the time of a run; one line an integrator."""
+    """Plot two panels: error of the trajectory and drift of the energy against run time, one line per integrator."""
     if axes is None:
         import matplotlib.pyplot as plt
 

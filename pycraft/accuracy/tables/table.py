@@ -1,4 +1,4 @@
-"""What accuracy costs: error, time and memory of every way of computing forward dynamics, and the Pareto front among them."""
+"""Cost of accuracy: error, time and memory of every way of computing forward dynamics, and the Pareto front."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from ..rungs import LADDER, Rung, epsilon, precision_name, reference_of
 from .timing import time_forward_dynamics, workspace_bytes
 
 STATES = 5
-"""Random states that a model is measured at where none is given."""
+"""Default number of random states."""
 
 
 class AccuracyTable(TidyTable):
-    """Rows of `accuracy`, cheapest first, refused ones last.
+    """Rows of `accuracy`, cheapest first, refused rows last.
 
     Each row is a dictionary: "way" (form or method and refinement), "form", "refine", "residual", "precision", "method", "error" (relative,
     2-norm, the largest over the states), "median_error", "component" (the largest relative error of one acceleration, |δ_i| / |x_i|, as
-    returned in double), "rounded" (whether "error" is that of values rounded to double, though the precision is wider), "reference"
-    (what errors are measured against), "seconds" (per evaluation), "cost" (the time over that of `fast` in double, where that is not
+    returned in double), "rounded" (True if "error" includes the rounding to double of a wider precision), "reference"
+    (precision of the reference), "seconds" (per evaluation), "cost" (the time over the time of `fast` in double, if that is not
     refused), "bytes" (of the workspace), "states" (how many), "pareto" (no other row is both faster and more accurate), "refused" (the
-    reason, where there is one; then there is no error).
+    reason, if the row is refused; then there is no error).
     """
 
     columns = (
@@ -58,7 +58,7 @@ class AccuracyTable(TidyTable):
         return min(answers, key=lambda row: row["seconds"])
 
     def plot(self, ax: Any = None) -> Any:
-        """Error against time per evaluation, both logarithmic, the Pareto front drawn and named; returns the axes."""
+        """Plot error against time per evaluation, both logarithmic, with the labelled Pareto front; return the axes."""
         from .plotting import accuracy_plot
 
         return accuracy_plot(self, ax)
@@ -103,41 +103,41 @@ def accuracy(
     seconds: float = 0.1,
     progress: Callable[[str], None] | None = None,
 ) -> AccuracyTable:
-    """Forward dynamics of a model in every form, refinement, precision and method: error, time and memory.
+    """Measure forward dynamics of a model in every form, refinement, precision and method: error, time and memory.
 
     Parameters
     ----------
     model : Multibody
     q, v, tau : (nq,), (nv,), (nv,), each with an optional leading batch axis
-        The states: rad, m and their rates; N m, N. Left out: q five random states (v with them), v zero, tau drawn from a standard normal
+        The states: rad, m and their rates; N m, N. Default: five random states for q (with v), zero for v, tau drawn from a standard normal
         distribution.
-    forms : of the articulated-inertia sweep; all that there are
-    refinements : of 0, 1, ..., "auto", and pairs with the residual: (1, "gather"), (1, "wider")
-        0, 1, (1, "gather") and (1, "wider") in single and double precision, 0 and 1 in extended, 0 beyond.
+    forms : forms of the articulated-inertia sweep; default: all
+    refinements : some of 0, 1, ..., "auto", and pairs with the residual: (1, "gather"), (1, "wider")
+        Default: 0, 1, (1, "gather") and (1, "wider") in single and double precision, 0 and 1 in extended, 0 beyond.
     precisions : "single", "double", "extended", "quad", 50, 100
-        The first four; single and double for the other methods.
-    methods : "articulated" and those of `forward_dynamics`; all of them
-    seed : of the states and forces
-    seconds : spent on the timing of each row
+        Default: the first four; single and double for the other methods.
+    methods : "articulated" and the methods of `forward_dynamics`; default: all
+    seed : seed of the random states and forces
+    seconds : time spent on each row
     progress : called with the label of each row before it is measured
 
-    Every combination of what is given is a row (a single name or number stands for a list of one); forms and refinements belong to the
-    articulated method. Errors are relative, in the 2-norm of the accelerations, against quad precision; those of quad itself, and of what
-    is wider, against the next wider precision. A 2-norm over rad/s² and m/s² is blind to a small component that is wrong; "component" is
-    not.
-    In precisions wider than double results are rounded to double when they are returned: the error there is the correction that a residual
-    in the next wider precision makes, but for refined values and other methods, whose rows show their rounding to double and say so.
-    Times are the least of many calls of one state from C++, in rotation over the states. A way that raises at one of the states is
+    Every combination of the arguments is a row (a single name or number counts as a list of one); forms and refinements belong to the
+    articulated method. Errors are relative, in the 2-norm of the accelerations, against quad precision; errors of quad and wider
+    precisions against the next wider precision. A 2-norm over rad/s² and m/s² hides errors of small components; "component" shows
+    them.
+    In precisions wider than double, results are rounded to double when returned: the error there is the correction by a residual
+    in the next wider precision, except for refined values and other methods, whose rows include the rounding to double and are marked.
+    Times are the least of many calls for one state from C++, in rotation over the states. A way that raises at one of the states is
     refused as a whole.
 
     Raises
     ------
     TypeError
-        What is given is no model.
+        The argument is not a model.
     ModelError
         A model without coordinates, no state, states of the wrong shape or not finite.
     EvaluationError
-        A form, refinement, precision or method that is not there; an empty list; seconds or seed below zero.
+        An unknown form, refinement, precision or method; an empty list; seconds or seed below zero.
 
     Examples
     --------
@@ -201,14 +201,14 @@ def _row(model: Any, q: Any, v: Any, tau: Any, rung: Rung, truth: Callable, seco
 
 
 def largest_component(value: np.ndarray, exact: np.ndarray) -> float:
-    """max |δ_i| / |x_i| of values (n,) against exact ones, mpmath numbers; infinite where one is not zero and should be."""
+    """Return max |δ_i| / |x_i| of values (n,) against exact ones, mpmath numbers; infinite if a nonzero value should be zero."""
     with mpmath.workprec(BITS):
         off = [abs(mpmath.mpf(float(x)) - e) for x, e in zip(value, exact, strict=True)]
         return max(float(d / abs(e)) if e else float("inf") if d else 0.0 for d, e in zip(off, exact, strict=True))
 
 
 def mark_pareto(rows: list[dict[str, Any]]) -> None:
-    """Mark the rows that no other is at once as fast as, and more accurate than; refused rows are out of it."""
+    """Mark the rows for which no other row is both as fast and more accurate; refused rows are excluded."""
     best = float("inf")
     for row in sorted((r for r in rows if not r["refused"]), key=lambda r: (r["seconds"], r["error"])):
         row["pareto"] = row["error"] < best
@@ -216,7 +216,7 @@ def mark_pareto(rows: list[dict[str, Any]]) -> None:
 
 
 def _product(forms: Any, refinements: Any, precisions: Any, methods: Any) -> list[Rung]:
-    """The rows: what is given with everything, else the defaults that `accuracy` documents. Every name is checked here, and once."""
+    """Return the rows: all combinations of the arguments, with the defaults documented in `accuracy`. All names are checked here."""
     ways = list(METHODS) if methods is None else checked_names(methods, "methods", "method", METHODS)
     shapes = list(_core.forms()) if forms is None else checked_names(forms, "forms", "form", _core.forms())
     widths = None if precisions is None else checked_precisions(precisions)
@@ -233,16 +233,16 @@ def _product(forms: Any, refinements: Any, precisions: Any, methods: Any) -> lis
 
 
 def _usual_refinements(precision: Any) -> list[tuple[int | str, str]]:
-    """Refinements that are measured where none is asked for."""
+    """Return the default refinements."""
     if epsilon(precision) >= epsilon("double"):
         return [(0, "same"), (1, "same"), (1, "gather"), (1, "wider")]
     return [(0, "same"), (1, "same")] if str(precision) == "extended" else [(0, "same")]
 
 
 def _states(model: Any, q: Any, v: Any, tau: Any, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States (B, nq), (B, nv), (B, nv), drawn where none is given, checked."""
+    """Return checked states (B, nq), (B, nv), (B, nv), random by default."""
     if not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise _core.EvaluationError(f"seed={seed!r}: a whole number, zero or more")
+        raise _core.EvaluationError(f"seed={seed!r}: give a whole number, zero or more")
     if v is None and hasattr(q, "v"):
         v = q.v
     if q is None:
@@ -255,13 +255,13 @@ def _states(model: Any, q: Any, v: Any, tau: Any, seed: int) -> tuple[np.ndarray
         tau = np.random.default_rng(seed).normal(size=(*(drawn_for or (1,)), model.nv))
     q, v, tau, batch = motion_state(model, q, v, tau[0] if np.ndim(tau) == 2 and len(tau) == 1 else tau)
     if batch == (0,):
-        raise _core.ModelError(f"no state given: the arrays of {model.name!r} have no rows")
+        raise _core.ModelError(f"no state given: the arrays for {model.name!r} have no rows")
     q, v, tau = (np.ascontiguousarray(np.broadcast_to(a, (*(batch or (1,)), a.shape[-1]))) for a in (q, v, tau))
     return q, v, tau
 
 
 def ladder(table: AccuracyTable) -> list[dict[str, Any]]:
-    """The rows of a table that are steps of the ladder (fast, fast + 1 refinement, ud, ud + 1 refinement, extended, quad), in its order."""
+    """Return the rows that are steps of the ladder (fast, fast + 1 refinement, ud, ud + 1 refinement, extended, quad), in its order."""
     found = []
     for step in LADDER:
         same = [replace(step, precision=str(step.precision)) == _rung_of(row) for row in table]

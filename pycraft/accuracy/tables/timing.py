@@ -1,4 +1,4 @@
-"""What one forward dynamics costs, in every way there is: seconds and bytes, measured in the core."""
+"""Cost of one forward dynamics in every way of computing: seconds and bytes, measured in the core."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ def time_forward_dynamics(
     precision: str | int = "double",
     method: str = "articulated",
 ) -> dict[str, float]:
-    """Seconds per call over the states q (K, nq), v (K, nv), tau (K, nv) in rotation: `minimum`, `median`, `calls`.
+    """Return seconds per call over the states q (K, nq), v (K, nv), tau (K, nv) in rotation: `minimum`, `median`, `calls`.
 
-    `seconds` is what the measurement may take; options as `forward_dynamics` has them, and what it raises. ModelError without a state.
+    `seconds` is the time for the measurement; options and errors as for `forward_dynamics`. Raises ModelError without a state.
     """
     q, v, tau = (np.atleast_2d(x) for x in (q, v, tau))
     if not len(q):
-        raise _core.ModelError(f"no state given: a time of {model.name!r} takes one at least")
+        raise _core.ModelError(f"no state given: timing {model.name!r} needs at least one")
     if method == "articulated":
         return _core.time_forward(model, q, v, tau, seconds, form, refine, residual, precision)
     if method != "realization":
         return _core.time_method(model, method, q, v, tau, seconds, precision)
-    # Factored anew at every state of a batch; the bias forces come before.
+    # Factored again at every state of a batch, after the bias forces.
     timed = _core.time_apply(_mass_matrix(model).inv().at(q, precision=precision), np.ones(model.nv), seconds, rules=False)
     bias = _core.time_dynamics(model, "inverse_dynamics", q, v, tau, seconds / 4)["median"]
     return {"minimum": timed["minimum"] / len(q) + bias, "median": timed["median"] / len(q) + bias, "calls": timed["calls"] * len(q)}
 
 
 def workspace_bytes(model: Any, *, precision: str | int = "double", form: str = "fast", method: str = "articulated") -> int:
-    """Bytes that one forward dynamics works in.
+    """Return the bytes of the workspace of one forward dynamics.
 
-    As the core tells them; but "realization" is planned in doubles, and grown by the size of the precision's scalar over that of a
-    double, which is the ratio of the articulated method's workspaces.
+    As reported by the core, except for "realization", which is planned in doubles and scaled by the size of the precision's scalar over a
+    double's, the ratio of the articulated method's workspaces.
     """
     if method == "articulated":
         return model._calls().memory(form, precision)

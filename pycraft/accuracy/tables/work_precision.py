@@ -18,27 +18,27 @@ from .confirmation import SECOND, about, confirmation, own_error
 INTEGRATORS = ("dopri5", "dop853", "bulirsch-stoer", "rkmk4", "scipy:RK45", "scipy:DOP853", "scipy:LSODA")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 STEPS = tuple(0.05 / 2**k for k in range(0, 10, 2))
-"""Seconds: of integrators with steps of one size."""
+"""Steps, s, of integrators with fixed steps."""
 Run = tuple[np.ndarray, np.ndarray, int, float]
 """q and v at the sampled times, evaluations, seconds."""
 Integrate = Callable[..., Run]
 """A run by the name of an integrator, with its options."""
 SAMPLES = 8
-"""Times, evenly spaced, at which trajectories are compared."""
+"""Number of evenly spaced times at which trajectories are compared."""
 
 
 class WorkPrecisionTable(TidyTable):
     """Rows of `work_precision`: one integrator at one tolerance each.
 
-    Each row is a dictionary: "integrator", "tolerance" (rtol and atol, None of steps of one size), "step" (s, None of controlled ones),
-    "error" (of the configuration, on the group: the root mean square over coordinates, rad and m, the largest over the sampled times),
-    "drift" (of the energy, the largest over the sampled times relative to the largest kinetic energy of the reference; None where energy
-    is not conserved or not given), "seconds" (of the whole run), "evaluations" (of the accelerations), "resolved" (whether the error
-    stands above the reference's own), "refused" (the reason, where there is one).
+    Each row is a dictionary: "integrator", "tolerance" (rtol and atol, None for fixed steps), "step" (s, None for controlled steps),
+    "error" (error of the configuration, on the group: root mean square over coordinates, rad and m, the largest over the sampled times),
+    "drift" (drift of the energy, the largest over the sampled times relative to the largest kinetic energy of the reference; None if energy
+    is not conserved or not given), "seconds" (of the whole run), "evaluations" (of the accelerations), "resolved" (True if the error
+    exceeds the reference's own), "refused" (the reason, if the row is refused).
 
-    `reference` is what errors are measured against, in words; `reference_error` its own error, measured as theirs: the larger of its
-    distances to a looser run and to the motion that a method of another family finds. `confirmation` says to how many digits both methods
-    agree, or that the reference is not confirmed.
+    `reference` describes the reference in words; `reference_error` is its own error, measured in the same way: the larger of its
+    distances to a looser run and to the motion by a method of another family. `confirmation` gives the number of digits to which both
+    methods agree, or that the reference is not confirmed.
     """
 
     columns: ClassVar[tuple[str, ...]] = (
@@ -67,16 +67,16 @@ class WorkPrecisionTable(TidyTable):
         return f"reference: {self.reference}, {self.confirmation}" if self.confirmation else ""
 
     def fastest(self, error: float) -> dict[str, Any]:
-        """The cheapest row whose error is at most `error`. Raises ValueError where none is."""
+        """Return the cheapest row with an error of at most `error`. Raises ValueError if there is none."""
         answers = [row for row in self.rows if not row["refused"] and row["error"] <= error]
         if not answers:
             best = min((row for row in self.rows if not row["refused"]), key=lambda row: row["error"], default=None)
-            found = "every one is refused" if best is None else f"the best is {self.label(best)}, {best['error']:.1e}"
+            found = "every row is refused" if best is None else f"the best is {self.label(best)}, {best['error']:.1e}"
             raise ValueError(f"no row of {self.title!r} has an error of at most {error:g}: {found}")
         return min(answers, key=lambda row: row["seconds"])
 
     def plot(self, axes: Any = None) -> Any:
-        """Two panels, error and energy drift against the time of a run, logarithmic; returns the axes."""
+        """Plot two panels, error and energy drift against run time, logarithmic; return the axes."""
         from .plotting import work_precision_plot
 
         return work_precision_plot(self, axes)
@@ -118,46 +118,46 @@ def work_precision(
     seconds: float = 0.05,
     progress: Callable[[str], None] | None = None,
 ) -> WorkPrecisionTable:
-    """Integrate one motion by several integrators at several tolerances, and measure what each costs and how far off it is.
+    """Integrate one motion by several integrators at several tolerances, and measure the cost and the error of each.
 
     Parameters
     ----------
     model : Multibody
     q, v, tau : (nq,) or a State, (nv,), (nv,)
-        The initial state and constant generalized forces, zero where left out.
+        The initial state and constant generalized forces, default zero.
     duration : s
-    integrators : names that `integrate_ode` takes
-        The core's run in C++; those of SciPy and SUNDIALS call from Python, and their time is mostly that of Python.
+    integrators : names of `integrate_ode`
+        The core's integrators run in C++; SciPy's and SUNDIALS' call from Python, which takes most of their time.
     tolerances : rtol and atol of integrators with controlled steps
-    steps : s, of those with steps of one size ("rk4", "rkmk4", "variational2", ...)
+    steps : s, for integrators with fixed steps ("rk4", "rkmk4", "variational2", ...)
     right_hand_side : callable (t, q, v) -> v̇ (nv,)
-        Any other motion of the same coordinates: with contact, control, damping. It takes the place of forward dynamics under `tau`, for
-        integrators that need no more than accelerations at states, and is tried once at the initial state before anything is measured.
+        Any other motion of the same coordinates: with contact, control, damping. It replaces forward dynamics under `tau`, for
+        integrators that need only accelerations at states, and is called once at the initial state before measuring.
     energy : callable (q, v) -> J
-        What the motion conserves; kinetic and potential energy of the model where neither tau nor right_hand_side is given. A row where it
-        is no finite number is refused.
-    form, refine : of forward dynamics, as it takes them
-    seconds : a run is repeated until this is spent, once at least; the least time counts
+        Conserved quantity; default: kinetic and potential energy of the model, without tau and right_hand_side. A row where it
+        is not finite is refused.
+    form, refine : options of forward dynamics
+    seconds : time over which a run is repeated, at least once; the least time counts
     progress : called with "reference", then with each row's name before it is run
 
-    A name or number stands for a list of one. The reference comes first and is two runs: of long or fast motions it may take longer than
-    every row, and an interrupt ends it.
+    A single name or number counts as a list of one. The reference comes first and takes two runs: for long or fast motions it may take
+    longer than all rows, and can be interrupted.
 
     The reference is dop853 in extended precision at a tolerance of 1e-16 (with a right-hand side: DOP853 at 1e-13 in double). Its own
-    error is its distance to a run at a hundred times that tolerance, which the motion's sensitivity is in, or to the motion that an
-    extrapolation method finds (bulirsch-stoer), if that is larger; rows below it are not resolved. The table says to how many digits both
-    methods agree; below six the reference is not confirmed, which the table and a ModelWarning say.
-    Trajectories are compared at eight times; integrators of other packages interpolate to them, the core's end a step there.
+    error is its distance to a run at a hundred times that tolerance, which includes the motion's sensitivity, or to the motion by an
+    extrapolation method (bulirsch-stoer), if that is larger; rows below it are not resolved. The table gives the number of digits to which
+    both methods agree; below six the reference is not confirmed, as stated in the table and a ModelWarning.
+    Trajectories are compared at eight times; integrators of other packages interpolate to them, the core's integrators end a step there.
 
     Raises
     ------
     TypeError
-        What is given is no model.
+        The argument is not a model.
     ModelError
         A model without coordinates; states or forces of the wrong shape or not finite.
     EvaluationError
-        An integrator, form or refinement that is not there; tolerances, steps or a duration that are not positive and finite; a
-        right_hand_side or energy whose result at the initial state is none; a reference that cannot be computed, with the time.
+        An unknown integrator, form or refinement; tolerances, steps or a duration that are not positive and finite; a
+        right_hand_side or energy with an invalid result at the initial state; a reference that cannot be computed, with the time.
 
     Examples
     --------
@@ -173,7 +173,7 @@ def work_precision(
     seconds, refine = checked_seconds(seconds), _core.checked_refinement(refine, "same", "double")
     q, v, tau = _initial(model, q, v, tau)
     if not isinstance(duration, (int, float, np.number)) or not 0 < duration < np.inf:
-        raise _core.EvaluationError(f"duration={duration!r}: a positive, finite number of seconds")
+        raise _core.EvaluationError(f"duration={duration!r}: give a positive, finite number of seconds")
     integrators = checked_names(integrators, "integrators", "integrator", integrator_names())
     tolerances = checked_positive(tolerances, "tolerances", "a positive, finite tolerance")
     steps = checked_positive(steps, "steps", "a positive, finite number of seconds")
@@ -189,7 +189,7 @@ def work_precision(
     name, wide, tolerance = ("dop853", "extended", 1e-16) if right_hand_side is None else ("scipy:DOP853", "double", 1e-13)
     truth = integrate(name, wide, rtol=tolerance, atol=tolerance)
     looser = integrate(name, wide, rtol=100 * tolerance, atol=100 * tolerance)
-    tightest = tolerance if right_hand_side is None else 10 * tolerance  # in double precision, of a right-hand side
+    tightest = tolerance if right_hand_side is None else 10 * tolerance  # a right-hand side is in double precision
     found = confirmation(
         truth[0],
         lambda: integrate(SECOND, wide, rtol=tightest, atol=tightest)[0],
@@ -219,7 +219,7 @@ def work_precision(
 
 
 def _runs(model: Any, q: np.ndarray, v: np.ndarray, times: np.ndarray, tau: Any, form: str, refine: Any, right_hand_side: Any) -> Integrate:
-    """Runs of `integrate_ode`, of forward dynamics or of a right-hand side of one's own."""
+    """Return runs of `integrate_ode`, with forward dynamics or with the user's right-hand side."""
     own: dict[str, Any] = {"tau": tau, "form": form, "refine": refine} if right_hand_side is None else {"right_hand_side": right_hand_side}
 
     def integrate(integrator: str, precision: str = "double", rtol: float = 1e-9, atol: float = 1e-12, step: float | None = None) -> Run:
@@ -234,10 +234,10 @@ def measured_row(
     model: Any, integrator: str, options: dict[str, float], integrate: Integrate, truth: np.ndarray, own: float, energy: Any, scale: float,
     budget: float,
 ) -> dict[str, Any]:  # fmt: skip
-    """One row: a run by an integrator at a tolerance or step, its error against `truth` (K, nq), its time.
+    """Return one row: a run by an integrator at a tolerance or step, its error against `truth` (K, nq), its time.
 
-    own : rad, m, the error of the truth itself. energy : a function of (q, v), or None; scale : J, what its drift is relative to.
-    budget : s, for which the run is repeated.
+    own : rad, m, the error of the truth itself. energy : a function of (q, v), or None; scale : J, the scale of its drift.
+    budget : s, time over which the run is repeated.
     """
     row: dict[str, Any] = dict.fromkeys(WorkPrecisionTable.columns)
     row |= {"integrator": integrator, "tolerance": options.get("rtol"), "step": options.get("step"), "refused": ""}
@@ -248,7 +248,7 @@ def measured_row(
     if energy is not None and scale > 0:
         values = np.array([energy(x, y) for x, y in zip(q, v, strict=True)], float)
         if not np.isfinite(values).all():
-            return row | {"refused": f"energy(q, v) is {values[~np.isfinite(values)][0]} along the motion, no number of joules"}
+            return row | {"refused": f"energy(q, v) is {values[~np.isfinite(values)][0]} along the motion, not a finite number of joules"}
         row["drift"] = float(np.abs(values - values[0]).max() / scale)
     error, spent = trajectory_error(model, truth, q), taken
     while spent < budget:
@@ -259,13 +259,13 @@ def measured_row(
 
 
 def trajectory_error(model: Any, truth: np.ndarray, q: np.ndarray) -> float:
-    """The largest distance of two trajectories (T, nq) over their times: the root mean square of `difference` over the coordinates."""
+    """Return the largest distance of two trajectories (T, nq) over their times: root mean square of `difference` over the coordinates."""
     distances = [np.sqrt(np.mean(np.square(model.difference(a, b)))) for a, b in zip(truth, q, strict=True)]
     return float(max(distances, default=0.0))
 
 
 def _initial(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """One initial state (nq,), (nv,) and forces (nv,) or None, checked."""
+    """Return the checked initial state (nq,), (nv,) and forces (nv,) or None."""
     v = getattr(q, "v", None) if v is None else v
     q, v = getattr(q, "q", q), np.zeros(model.nv) if v is None else getattr(v, "v", v)
     model.configuration_rate(q, v)  # the core's own checks
@@ -277,21 +277,21 @@ def _initial(model: Any, q: Any, v: Any, tau: Any) -> tuple[np.ndarray, np.ndarr
 
 
 def _probe(model: Any, q: np.ndarray, v: np.ndarray, right_hand_side: Any, energy: Any) -> None:
-    """Call what is given once, at the initial state: its errors come before minutes of measuring."""
+    """Call the user's functions once at the initial state, so that their errors appear before minutes of measuring."""
     for name, function in (("right_hand_side", right_hand_side), ("energy", energy)):
         if function is not None and not callable(function):
-            raise _core.EvaluationError(f"{name}: a function is called, not {function!r}")
+            raise _core.EvaluationError(f"{name} must be a function, not {function!r}")
     if right_hand_side is not None:
         rate = np.asarray(right_hand_side(0.0, q.copy(), v.copy()), float)
         if rate.shape != (model.nv,):
-            raise _core.EvaluationError(f"right_hand_side(0, q, v) has shape {rate.shape}; it gives the accelerations, ({model.nv},)")
+            raise _core.EvaluationError(f"right_hand_side(0, q, v) has shape {rate.shape}; it must return the accelerations, ({model.nv},)")
         if not np.isfinite(rate).all():
             at = int(np.argmin(np.isfinite(rate)))
             raise _core.EvaluationError(f"right_hand_side(0, q, v) is {rate[at]} at coordinate {model.coordinate_names[at]!r}")
     if energy is not None:
         value = np.asarray(energy(q.copy(), v.copy()), float)
         if value.shape != () or not np.isfinite(value):
-            raise _core.EvaluationError(f"energy(q, v) is {value} at the initial state; it gives a finite number of joules")
+            raise _core.EvaluationError(f"energy(q, v) is {value} at the initial state; it must return a finite number of joules")
 
 
 def _mechanical_energy(model: Any) -> Callable[[np.ndarray, np.ndarray], float]:

@@ -1,4 +1,4 @@
-"""Effects, each a class: what acts on a model where a scene has it. docs/scenes.md has them all in one table."""
+"""Effects, one class each, which act on the model of a scene to which they are added. docs/scenes.md lists all in one table."""
 
 from .actuators import Motor, RotorInertia, Servo, TorqueSource
 from .effect import Effect

@@ -1,4 +1,4 @@
-"""What drives hinges, within limits of effort and speed."""
+"""Actuators of hinges, within limits of effort and speed."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .functions_of_time import function_of_time
 from .stiffness_by_inertia import stiffness_by_inertia
 
 FREQUENCY = 20.0
-"""rad/s, of a servo's coordinate where no stiffness is given."""
+"""Default frequency of a servo, rad/s, if no stiffness is given."""
 
 
 def _limits(effect: Any, kind: str) -> tuple[list[float], list[float], float]:
-    """Effort, speed and band as the core takes them."""
+    """Return effort, speed and band for the core."""
     effort, speed = (numbers_of(getattr(effect, name), f"{kind}: {name}") for name in ("effort_limit", "speed_limit"))
     return effort, speed, one_number(effect.speed_band, f"{kind}: speed_band")
 
@@ -32,9 +32,9 @@ class TorqueSource(Effect):
     torque : N m or N
         One number or one for each coordinate; a `Table`, `Spline` or `Harmonic`; or a function of t.
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
-    effort_limit : N m or N, what it does not exceed; inf: none
-    speed_limit : rad/s or m/s, beyond which it does not push; inf: none
-    speed_band : share of the speed limit within which what drives further falls to nothing
+    effort_limit : N m or N, largest effort; inf: no limit
+    speed_limit : rad/s or m/s, speed beyond which it does not drive further; inf: no limit
+    speed_band : share of the speed limit over which the driving effort falls to zero
     """
 
     _example = "pc.effects.TorqueSource(1.0)"
@@ -58,12 +58,12 @@ class Servo(Effect):
     ----------
     stiffness, damping : N m/rad or N/m, N m s/rad or N s/m
         One number or one for each coordinate. Stiffness None: ω² (ℳ + J)_jj at q = 0 with ω = 20 rad/s. Damping None: critical,
-        2ω (ℳ + J)_jj, beside a stiffness that is None, else zero.
+        2ω (ℳ + J)_jj, if stiffness is also None, else zero.
     target : rad or m
-        One number or one for each coordinate; a `Table`, `Spline` or `Harmonic`; or a function of t, whose rate is found by differences
-        unless it gives the tuple (position, velocity, acceleration).
-    hinges : names of hinges, coordinates, patterns, or a list of them; None: all that can have one
-    effort_limit, speed_limit, speed_band : as of `TorqueSource`
+        One number or one for each coordinate; a `Table`, `Spline` or `Harmonic`; or a function of t, differentiated numerically
+        unless it returns the tuple (position, velocity, acceleration).
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all pins, sliders and screws
+    effort_limit, speed_limit, speed_band : as for `TorqueSource`
     """
 
     _example = "pc.effects.Servo(stiffness=100.0, damping=20.0)"
@@ -100,11 +100,11 @@ class Motor(Effect):
     ----------
     command : from -1 to 1
         One number or one for each coordinate; a `Table`, `Spline` or `Harmonic`; or a function of t.
-    stall_torque, no_load_speed : N m and rad/s at the motor's shaft (N and m/s of a linear one)
+    stall_torque, no_load_speed : N m and rad/s at the motor's shaft (N and m/s for a linear motor)
     gear_ratio : n, turns of the motor for one of the hinge
     rotor_inertia : kg m² at the motor's shaft
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
-    effort_limit, speed_limit, speed_band : at the hinge, as of `TorqueSource`
+    effort_limit, speed_limit, speed_band : at the hinge, as for `TorqueSource`
     """
 
     _example = "pc.effects.Motor(0.5, stall_torque=2.0, no_load_speed=300.0, gear_ratio=50.0)"

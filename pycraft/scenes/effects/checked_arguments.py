@@ -1,4 +1,4 @@
-"""Arguments of effects and functions of time, checked before one is made."""
+"""Arguments of effects and functions of time, checked before construction."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ... import _core
 
 
 class Checked(type):
-    """A metaclass whose classes refuse arguments that do not fit with a ModelError, which shows their `_example`."""
+    """A metaclass whose classes refuse wrong arguments with a ModelError that shows their `_example`."""
 
     _example = ""
 
     def __call__(cls, *given: Any, **named: Any) -> Any:
-        """Make an object. ModelError for a missing, unknown or surplus argument."""
+        """Make an object. Raises ModelError for a missing, unknown or surplus argument."""
         try:
             inspect.signature(cls.__init__).bind(None, *given, **named)  # type: ignore[misc]  # the class's own, as type.__call__ takes it
         except TypeError as error:
@@ -25,7 +25,7 @@ class Checked(type):
 
 
 def _misfit(cls: Any, given: int, named: Mapping[str, Any]) -> str:
-    """Say which argument is missing, unknown or surplus, and give an example."""
+    """Return a message that names the missing, unknown or surplus argument, with an example."""
     known = list(inspect.signature(cls.__init__).parameters.values())[1:]
     names = [parameter.name for parameter in known]
     example = f", for example {cls._example}" if cls._example else ""

@@ -1,4 +1,4 @@
-"""What every effect has: fields that a person reads, a name of its kind, and its counterpart in the core."""
+"""Base of all effects: readable fields, a name of the kind, and the counterpart in the core."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from .checked_arguments import Checked
 
 
 class Effect(Closed, metaclass=Checked):
-    """An effect: what acts on a model where a scene has it. Its fields can be set; a scene takes the change at its next call.
+    """An effect, which acts on the model of a scene to which it is added. Its fields can be set; a scene uses the change at its next call.
 
-    What is given is copied: fields hold read-only arrays, and lists and mappings that stay as they are. A number in one of them is
-    changed by setting the field anew.
+    Arguments are copied: fields hold read-only arrays, and immutable lists and mappings. To change one of their numbers, set
+    the field again.
 
-    Subclasses are dataclasses whose fields are what a user gives, and say in `made_for` what they are in the core. A class attribute
-    `_example` is the call that an error about its arguments shows.
+    Subclasses are dataclasses whose fields are the user's arguments; `made_for` returns their counterpart in the core. A class attribute
+    `_example` is the call shown in errors about arguments.
     """
 
     _changes = 0
     _example = ""
-    _several: tuple[str, ...] = ()  # fields whose items are values each
+    _several: tuple[str, ...] = ()  # fields whose items are separate values
 
     @classmethod
     def kind(cls) -> str:
-        """The name of its kind, which it has in a scene unless another is given: "coulomb_friction"."""
+        """Return the name of its kind, its default name in a scene: "coulomb_friction"."""
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     def made_for(self, model: _core.Multibody) -> _core.Effect:
-        """The effect as the core has it, for a model. ModelError for names that are not there and numbers that make no sense."""
-        raise NotImplementedError(f"{type(self).__name__} says in made_for what it is in the core")
+        """Return the effect of the core for a model. Raises ModelError for unknown names and invalid values."""
+        raise NotImplementedError(f"{type(self).__name__} must define made_for, which returns the effect of the core")
 
     def completed_for(self, model: _core.Multibody) -> Effect:  # noqa: ARG002 - subclasses need it
-        """Return the effect with every value that it takes from a model filled in: itself where it takes none."""
+        """Return the effect with all values filled in that it takes from a model; itself if it takes none."""
         return self
 
     def at_states(self, model: _core.Multibody) -> Effect:  # noqa: ARG002 - subclasses need it
-        """What it comes to in small steps: itself, or for one that acts in steps the effect that acts at states."""
+        """Return its limit for small steps: itself, or for an effect that acts in steps the effect that acts at states."""
         return self
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -56,12 +56,12 @@ class Effect(Closed, metaclass=Checked):
         self.__dict__.update({name: fixed(value) if name in own else value for name, value in state.items()})
 
     def named(self) -> set[str]:
-        """What its fields name of a model: bodies, nodes, hinges, and of coordinates "hinge[j]" the hinge, too."""
+        """Return the names of a model in its fields: bodies, nodes, hinges, and for coordinates "hinge[j]" also the hinge."""
         named = [name for field in fields(self) for name in _each_text(getattr(self, field.name))]  # type: ignore[arg-type]  # dataclasses
         return {*named, *(name.partition("[")[0] for name in named)}
 
     def by_coordinate(self) -> set[str]:
-        """Hinges whose coordinates it takes one by one: "hinge[j]", and lists of numbers by hinge; "" where a list is of those of all."""
+        """Return hinges whose coordinates have separate values: "hinge[j]", and lists of values by hinge; "" for a list for all."""
         found: set[str] = set()
         values = self.values()
         for value in values:
@@ -77,7 +77,7 @@ class Effect(Closed, metaclass=Checked):
         return found
 
     def values(self, besides: tuple[str, ...] = ()) -> list[Any]:
-        """What its fields hold, besides these: each a value that may be of all coordinates or of each."""
+        """Return the values of its other fields: each may apply to all coordinates or to one."""
         found: list[Any] = []
         for field in fields(self):  # type: ignore[arg-type]  # subclasses are dataclasses
             value = getattr(self, field.name)
@@ -86,7 +86,7 @@ class Effect(Closed, metaclass=Checked):
         return found
 
     def parameters(self) -> dict[str, Any]:
-        """The fields that are not at their defaults, by name."""
+        """Return the fields that differ from their defaults, by name."""
         given = {}
         for field in fields(self):  # type: ignore[arg-type]  # subclasses are dataclasses
             default = field.default if field.default_factory is MISSING else field.default_factory()
@@ -96,7 +96,7 @@ class Effect(Closed, metaclass=Checked):
         return given
 
     def to_dict(self) -> dict[str, Any]:
-        """Its kind and its parameters as plain data: lists for arrays."""
+        """Return its kind and its parameters as plain data, with lists for arrays."""
         return {"effect": type(self).__name__} | {name: plain(value) for name, value in self.parameters().items()}
 
     def __repr__(self) -> str:
@@ -105,7 +105,7 @@ class Effect(Closed, metaclass=Checked):
 
 
 def _each_text(value: Any) -> Iterator[str]:
-    """Texts, and names of handles, in a value, its items and its keys."""
+    """Yield texts, and names of handles, in a value, its items and its keys."""
     if isinstance(value, Mapping):
         value = [*value, *value.values()]
     if isinstance(value, (list, tuple, set, frozenset)):
@@ -134,7 +134,7 @@ def _shown(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Arrays as lists, effects' functions of time as dictionaries, handles as their names; ModelError for what no file can hold."""
+    """Return arrays as lists, functions of time as dictionaries, handles as names. Raises ModelError for values that no file can hold."""
     if hasattr(value, "to_dict"):
         return value.to_dict()
     if isinstance(value, np.ndarray):
@@ -149,11 +149,11 @@ def plain(value: Any) -> Any:
         return value
     if isinstance(name := getattr(value, "name", None), str):
         return name
-    raise _core.ModelError(f"{value!r:.80} is no plain data: a function is Python's, and no file holds it")
+    raise _core.ModelError(f"{value!r:.80} is not plain data: a file cannot hold a Python function")
 
 
 def names_of(given: Any, effect: str, what: str = "hinges") -> list[str] | None:
-    """What an effect acts on, as a list of names: of a name, a handle, or a list of either; None is all."""
+    """Return the names on which an effect acts, from a name, a handle, or a list of either; None means all."""
     if given is None:
         return None
     if isinstance(given, str) or hasattr(given, "name"):
@@ -162,12 +162,12 @@ def names_of(given: Any, effect: str, what: str = "hinges") -> list[str] | None:
 
 
 def node_name(node: Any, effect: str) -> str:
-    """The name of a node or body, of its handle or of None, the base."""
+    """Return the name of a node or body, from its name, its handle or None (the base)."""
     return "" if node is None else text(getattr(node, "name", node), f"{effect}: a node")
 
 
 def numbers_of(value: Any, what: str) -> list[float]:
-    """One number, or a list of them."""
+    """Return one number as a list, or a list of numbers."""
     made = _core.real_array(value, what)
     if made.ndim > 1:
         raise _core.ModelError(f"{what} takes a number or a list of numbers, not an array {made.shape}")
@@ -175,12 +175,12 @@ def numbers_of(value: Any, what: str) -> list[float]:
 
 
 def by_hinge(value: Any, hinges: Any, model: _core.Multibody, effect: str, what: str) -> tuple[list[str] | None, list[float]]:
-    """Names and numbers of a parameter: a number, one for each coordinate, or a dictionary by hinge, which then says the hinges."""
+    """Return names and values of a parameter: a number, one for each coordinate, or a dictionary by hinge, which names the hinges."""
     names = names_of(hinges, effect)
     if not isinstance(value, Mapping):
         return names, numbers_of(value, f"{effect}: {what}")
     if names is not None:
-        raise _core.ModelError(f"{effect}: {what} names its hinges itself; leave out hinges=")
+        raise _core.ModelError(f"{effect}: {what} is a dictionary by hinge and names the hinges; leave out hinges=")
     numbers: list[float] = []
     for name, each in value.items():
         count = len(_core.coordinates_named(model, [name], effect))
@@ -190,8 +190,8 @@ def by_hinge(value: Any, hinges: Any, model: _core.Multibody, effect: str, what:
 
 
 def warn_of_negative(values: Sequence[float], effect: str, what: str, meaning: str) -> None:
-    """A ModelWarning where one of these is negative: legal, and hardly meant."""
+    """Warn (ModelWarning) if one of these is negative: legal, but probably not intended."""
     from ...models.warning import warn
 
     if values and min(values) < 0:
-        warn(f"{effect}: {what} is {min(values):g}, which is negative: {meaning}")
+        warn(f"{effect}: {what} is negative, {min(values):g}: {meaning}")

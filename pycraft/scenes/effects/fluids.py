@@ -29,14 +29,14 @@ class FluidDrag(Effect):
     bodies : names of bodies and nodes, one for each box
         By default every body that has mass and inertia, each with the homogeneous box of its mass and principal moments.
     sizes : (n, 3) m
-        The edges of each box; those boxes of equal mass and moments where left out.
+        The edges of each box; default: the homogeneous boxes of equal mass and moments.
     placements : (n, 4, 4)
-        The pose of each box in the frame of its body or node: left out together with `sizes`.
+        The pose of each box in the frame of its body or node; give it if and only if `sizes` is given.
 
     Raises
     ------
     ModelError
-        Unknown bodies, negative numbers or numbers that are not finite, placements without sizes.
+        Unknown bodies, values that are negative or not finite, placements without sizes.
     """
 
     density: float = 0.0
@@ -68,7 +68,7 @@ class FluidDrag(Effect):
 
 
 def _equivalent_boxes(model: Any, names: list[str] | None) -> tuple[list[str], list[np.ndarray], list[np.ndarray]]:
-    """The homogeneous boxes that have the masses and principal moments of bodies: names, placements in the bodies, edges."""
+    """Return the homogeneous boxes with the masses and principal moments of bodies: names, placements in the bodies, edges."""
     chosen, placements, sizes = [], [], []
     for name in model.bodies if names is None else names:
         body = model.bodies[name]
@@ -82,7 +82,7 @@ def _equivalent_boxes(model: Any, names: list[str] | None) -> tuple[list[str], l
 
 
 def equivalent_box(mass: float, com: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The pose (4, 4) and the edges (3,) of the homogeneous box with this mass, centre of mass and inertia about it."""
+    """Return the pose (4, 4) and the edges (3,) of the homogeneous box with this mass, centre of mass and central inertia."""
     moments, axes = np.linalg.eigh(inertia)
     placement = np.eye(4)
     placement[:3, :3], placement[:3, 3] = axes * np.sign(np.linalg.det(axes)), com

@@ -1,4 +1,4 @@
-"""What brakes the motion of hinges."""
+"""Friction and damping of hinges."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Damping(Effect):
     Parameters
     ----------
     coefficient : N m s/rad or N s/m
-        One number, one for each coordinate, or a dictionary by hinge. A negative one is warned of: it drives.
+        One number, one for each coordinate, or a dictionary by hinge. A negative value drives the motion and causes a warning.
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
 
@@ -34,12 +34,12 @@ class Damping(Effect):
 
 @dataclass(repr=False, eq=False)
 class QuadraticDamping(Effect):
-    """Damping as of a body in air, T = -c |v| v at every coordinate.
+    """Quadratic damping, as in air, T = -c |v| v at every coordinate.
 
     Parameters
     ----------
     coefficient : N m s²/rad² or N s²/m²
-        One number, one for each coordinate, or a dictionary by hinge. A negative one is warned of.
+        One number, one for each coordinate, or a dictionary by hinge. A negative value causes a warning.
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
 
@@ -56,14 +56,14 @@ class QuadraticDamping(Effect):
 
 @dataclass(repr=False, eq=False)
 class CoulombFriction(Effect):
-    """Dry friction, smoothed: T = -F tanh(v/s) at every coordinate. What should stick creeps, by s T/F.
+    """Dry friction, smoothed: T = -F tanh(v/s) at every coordinate. Joints that should stick creep at s T/F.
 
     Parameters
     ----------
     level : N m or N
         F: one number, one for each coordinate, or a dictionary by hinge; not negative.
     smoothing : rad/s or m/s
-        s, the speed at which three quarters of F are reached. Small ones make the equations stiff.
+        s, the speed at which three quarters of F are reached. Small values make the equations stiff.
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all
     """
 
@@ -80,10 +80,10 @@ class CoulombFriction(Effect):
 
 @dataclass(repr=False, eq=False)
 class ImplicitDamping(Effect):
-    """Viscous damping that steps of one size take implicitly: D has h c in addition ("semi-implicit-euler"), stable for any step and any c.
+    """Viscous damping, implicit in fixed steps: they add h c to D ("semi-implicit-euler"), stable for any step and any c.
 
-    Integrators that solve for their steps ("rosenbrock4", "radau", ...) and `Scene.evaluate` without a step see plain damping, T = -c v;
-    explicit ones refuse it.
+    Implicit integrators ("rosenbrock4", "radau", ...) and `Scene.evaluate` without a step use plain damping, T = -c v;
+    explicit integrators refuse it.
 
     Parameters
     ----------
@@ -101,5 +101,5 @@ class ImplicitDamping(Effect):
         names, values = by_hinge(self.coefficient, self.hinges, model, "implicit_damping", "coefficient")
         return _core.implicit_damping_effect(model, names, values)
 
-    def at_states(self, model: _core.Multibody) -> Damping:  # noqa: ARG002 - as its base has it
+    def at_states(self, model: _core.Multibody) -> Damping:  # noqa: ARG002 - signature of the base
         return Damping(self.coefficient, self.hinges)

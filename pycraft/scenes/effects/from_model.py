@@ -1,4 +1,4 @@
-"""Effects that a model's file speaks of: offered to scenes, and added by nobody but the user."""
+"""Effects described in a model's file: offered to scenes, but added only by the user."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .springs import Spring
 
 
 class Offered(Sequence[Effect]):
-    """Effects that a model offers, and in `notes` what its file says and no effect does. `scene.add(*offered)` adds them all."""
+    """Effects that a model offers; `notes` lists the contents of its file without an effect. `scene.add(*offered)` adds all."""
 
     def __init__(self, model: str, effects: Iterable[Effect], notes: Iterable[str]):
         self._model, self._effects, self.notes = model, list(effects), list(notes)
@@ -43,23 +43,23 @@ class Offered(Sequence[Effect]):
 
 
 def from_model(model: Any) -> Offered:
-    """Return the effects that a model's file speaks of, with its numbers.
+    """Return the effects described in a model's file, with their values.
 
-    URDF and SDF: damping and friction of joints, and bounds of effort and velocity as a torque source without torque that keeps them.
+    URDF and SDF: damping and friction of joints, and bounds of effort and velocity as a torque source of zero torque with these limits.
     MJCF: gravity, damping, frictionloss, stiffness, gravity compensation, the resistance of a fluid, and actuators with straight
     characteristics, at control zero (motors as `TorqueSource`, position and velocity servos as `Servo`); armature is the model's rotor
-    inertia already. What the file disables by a flag is not offered. The model's own gravity, where it is set, is offered as well.
+    inertia already. Effects that the file disables by a flag are not offered. The model's own gravity is offered if it is set.
 
     Returns
     -------
     Offered
-        A sequence of effects, also by kind: `offered["damping"]`. Its text lists them, and what is not offered with the reason; `notes`
-        has the latter.
+        A sequence of effects, also by kind: `offered["damping"]`. Its text lists them, and omissions with their reasons, which are also in
+        `notes`.
 
     Raises
     ------
     ModelError
-        The argument is no model.
+        The argument is not a model.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def from_model(model: Any) -> Offered:
 
 
 def _of_bodies(model: Any) -> list[Effect]:
-    """Weights that are held, by field of gravity, and boxes in fluids, by fluid."""
+    """Return compensated weights by gravity field, and boxes in fluids by fluid."""
     offers = getattr(model, "offers", [])
     effects: list[Effect] = []
     for g in dict.fromkeys(offer.g for offer in offers if isinstance(offer, HeldWeight)):
@@ -117,7 +117,7 @@ def _of_bodies(model: Any) -> list[Effect]:
 
 
 def _carrier(model: Any, name: str) -> tuple[str, np.ndarray]:
-    """The body that a body or node is part of, and the pose (4, 4) of the latter there."""
+    """Return the body that carries a body or node, and the pose (4, 4) of the latter there."""
     if name in model.bodies:
         return name, np.eye(4)
     node = model.nodes[name]
@@ -125,7 +125,7 @@ def _carrier(model: Any, name: str) -> tuple[str, np.ndarray]:
 
 
 def _numbers(model: Any, values: np.ndarray) -> tuple[list[str], np.ndarray]:
-    """Names of the coordinates that have a number, and these."""
+    """Return names of the coordinates that have a value, and the values."""
     there = np.flatnonzero(~np.isnan(values))
     return [model.coordinate_names[j] for j in there], values[there]
 
@@ -144,13 +144,13 @@ def _springs(model: Any, left: dict[str, np.ndarray], notes: list[str]) -> list[
             elif not np.isnan(values[v]):
                 rest += left.get("spring rest", np.asarray(model.zero_q()))[q : q + kind.nq].tolist()
             q, v = q + kind.nq, v + kind.nv
-    notes += [f"the spring of free hinge {name!r}, which a bushing between two nodes would be" for name in free]
+    notes += [f"the spring of free hinge {name!r}: add it as a bushing between two nodes" for name in free]
     names, numbers = _numbers(model, values)
     return [Spring(numbers, rest=rest if "spring rest" in left else 0.0, hinges=names)] if names else []
 
 
 def _limited(model: Any, left: dict[str, np.ndarray]) -> list[Effect]:
-    """Limits of effort and velocity, of a source that gives nothing yet."""
+    """Return limits of effort and velocity, as a source of zero torque."""
     none = np.full(model.nv, np.nan)
     effort, speed = left.get("effort limit", none), left.get("velocity limit", none)
     there = np.flatnonzero(~np.isnan(effort) | ~np.isnan(speed))
@@ -162,7 +162,7 @@ def _limited(model: Any, left: dict[str, np.ndarray]) -> list[Effect]:
 
 
 def _drives(model: Any, notes: list[str]) -> list[Effect]:
-    """Actuators, those of one sort in one effect as long as they are on different coordinates."""
+    """Return actuators; actuators of one kind on different coordinates form one effect."""
     groups: list[tuple[bool, list[dict[str, Any]]]] = []
     for actuator in getattr(model, "actuators", []):
         _, position, velocity = actuator["bias"]
@@ -172,7 +172,7 @@ def _drives(model: Any, notes: list[str]) -> list[Effect]:
             continue
         servo = bool(position or velocity)
         if servo and low != -high:
-            both = f"its effect has {max(-low, high):g} both ways"
+            both = f"its effect uses {max(-low, high):g} in both directions"
             notes.append(f"the force range [{low:g}, {high:g}] of actuator {actuator['name']!r}, which is not symmetric: {both}")
         for of_servos, group in groups:
             if of_servos == servo and all(other["coordinate"] != actuator["coordinate"] for other in group):
@@ -184,12 +184,12 @@ def _drives(model: Any, notes: list[str]) -> list[Effect]:
 
 
 def _at_rest(actuator: dict[str, Any]) -> float:
-    """The force before the gear at position and velocity zero and at the control that stands for zero."""
+    """Return the force before the gear at position and velocity zero, and at the control for zero."""
     return float(actuator["gain"] * actuator.get("control", 0.0) + actuator["bias"][0])
 
 
 def _common(group: Sequence[dict[str, Any]]) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates, gears, forces at rest and bounds of effort."""
+    """Return coordinates, gears, forces at rest and bounds of effort."""
     gear, rest = np.array([a["gear"] for a in group]), np.array([_at_rest(a) for a in group])
     most = np.array([np.abs(a["force range"]).max() for a in group])
     return [a["coordinate"] for a in group], gear, rest, np.abs(gear) * most

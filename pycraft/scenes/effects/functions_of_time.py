@@ -1,4 +1,4 @@
-"""Numbers as functions of time: what drives actuators, pushes nodes and prescribes motions."""
+"""Functions of time, for actuators, wrenches on nodes and prescribed motions."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from .effect import plain
 
 
 class InTime(Fixed, metaclass=Checked):
-    """A function of time that the core knows: no Python is called in a run. Arrays are copied on the way in, and read-only."""
+    """A function of time in the core: a run calls no Python. Arrays are copied and read-only."""
 
     def in_core(self) -> _core.FunctionOfTime:
         raise NotImplementedError
 
     def __call__(self, t: float) -> np.ndarray:
-        """Its numbers at a time."""
+        """Return its values at a time."""
         return self.in_core()(t)[0]
 
     def to_dict(self) -> dict[str, Any]:
-        """Its kind and numbers as plain data."""
+        """Return its kind and values as plain data."""
         return {"in_time": type(self).__name__} | {name: plain(value) for name, value in vars(self).items()}
 
 
 @dataclass(frozen=True)
 class Table(InTime):
-    """Values between points in time: straight lines from point to point, before the first and after the last what these are.
+    """Linear interpolation of values over time, constant before the first and after the last point.
 
     Parameters
     ----------
@@ -52,18 +52,18 @@ class Table(InTime):
 
 @dataclass(frozen=True)
 class Spline(InTime):
-    """The cubic spline through points in time, twice differentiable; before the first and after the last what these are.
+    """The cubic spline through values over time, twice differentiable, constant before the first and after the last point.
 
     Parameters
     ----------
     times : (K,) s, rising
     values : (K,) or (K, n)
     ends : {"not-a-knot", "natural", "clamped"}
-        "not-a-knot": one cubic through the first two intervals, and one through the last two, as SciPy's CubicSpline has it. With a
-        function's own values at distance h it is off by O(h⁴) everywhere. "natural": without curvature at the ends, off by O(h²) near
-        them where the function has some. "clamped": at rest at the ends, off by O(h) near them where the function is not.
+        "not-a-knot": one cubic through the first two intervals, and one through the last two, as in SciPy's CubicSpline. With a
+        function's own values at distance h the error is O(h⁴) everywhere. "natural": zero curvature at the ends, error O(h²) near
+        them if the function is curved there. "clamped": zero slope at the ends, error O(h) near them if the function's slope is not zero.
 
-    Where it is not at rest at an end, its rate jumps to zero there.
+    If the slope at an end is not zero, the rate jumps to zero there.
 
     Source: C. de Boor, A Practical Guide to Splines, Springer 2001, ch. IV.
     """
@@ -89,11 +89,11 @@ class Harmonic(InTime):
 
     Parameters
     ----------
-    amplitude, offset : in the unit of what it drives
+    amplitude, offset : in the unit of the driven quantity
     frequency : Hz
     phase : rad
 
-    Each one number, or (n,) for n functions.
+    Each is one number, or (n,) for n functions.
     """
 
     _example = "pc.effects.Harmonic(amplitude=0.5, frequency=2.0)"
@@ -109,7 +109,7 @@ class Harmonic(InTime):
         counts = {name: part.shape[0] for name, part in zip(names, parts, strict=True) if part.ndim == 1}
         if any(part.ndim > 1 for part in parts) or len(set(counts.values())) > 1:
             shapes = ", ".join(f"{name} {part.shape}" for name, part in zip(names, parts, strict=True))
-            raise _core.ModelError(f"a harmonic function takes one number of each, or (n,), not {shapes}")
+            raise _core.ModelError(f"a harmonic function takes one number for each parameter, or (n,), not {shapes}")
         return _core.harmonic(*(np.broadcast_to(part, next(iter(counts.values()), 1)).tolist() for part in parts))
 
 
@@ -118,20 +118,20 @@ def _points(times: Any, values: Any, what: str) -> tuple[np.ndarray, np.ndarray]
     if t.ndim != 1 or y.ndim not in (1, 2) or len(y) != len(t):
         raise _core.ModelError(f"{what} takes times (K,) and values (K,) or (K, n), not {t.shape} and {y.shape}")
     if len(t) < 2 or not (np.diff(t) > 0).all():
-        raise _core.ModelError(f"{what} takes two times at least, and they rise")
+        raise _core.ModelError(f"{what} takes at least two times, in rising order")
     return t, y.reshape(len(t), -1)
 
 
 def function_of_time(given: Any, what: str, size: int | None = None, derivatives: bool = False, step: float = 1e-3) -> _core.FunctionOfTime:
-    """A function of time in the core, of whatever a user gives for one.
+    """Return a function of time of the core from a user's argument.
 
     Parameters
     ----------
     given : number, array, InTime, a piecewise polynomial of SciPy's (CubicSpline, PPoly), or a callable of t
-    what : it is, for errors
-    size : numbers that a callable gives; None: what it gives at t = 0
-    derivatives : whether its derivatives are asked for
-    step : s, of the differences by which they are found where a callable gives values alone
+    what : its name in errors
+    size : number of values of a callable; None: as at t = 0
+    derivatives : True if its derivatives are needed
+    step : s, step of the differences for a callable that returns only values
     """
     if isinstance(given, InTime):
         return given.in_core()
@@ -154,7 +154,7 @@ def _values(given: Any, what: str) -> np.ndarray:
 
 
 class _Valued:
-    """A callable of t as the core calls it."""
+    """A callable of t, adapted to the core."""
 
     def __init__(self, call: Callable[[float], Any], what: str):
         self.call, self.what = call, what
@@ -165,7 +165,7 @@ class _Valued:
 
 
 class _Differentiated:
-    """A callable that gives (value, rate, second derivative), or values alone, which are then differentiated by differences of order 6."""
+    """A callable that returns (value, rate, second derivative), or only values, which are differentiated by differences of order 6."""
 
     def __init__(self, call: Callable[[float], Any], size: int, what: str, step: float):
         self.call, self.size, self.what, self.step = call, size, what, step

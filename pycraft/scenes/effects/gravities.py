@@ -12,19 +12,19 @@ from ...arguments import one_number
 from .effect import Effect, names_of, numbers_of
 
 EARTH = (0.0, 0.0, -9.81)
-"""m/s², where neither the effect nor the model has a gravity."""
+"""Default gravity, m/s², if neither the effect nor the model has one."""
 
 
 @dataclass(repr=False, eq=False)
 class Gravity(Effect):
     """Uniform gravity: the force m g at every body's centre of mass. Potential -Σ m g·c.
 
-    It costs nothing: accelerations are found with the base accelerated by -g.
+    It costs nothing: accelerations are computed with the base accelerated by -g.
 
     Parameters
     ----------
-    g : (3,) m/s², in the world's axes; None: the model's own gravity where that is not zero, else (0, 0, -9.81)
-        The model's gravity is read when the scene computes: a later `model.gravity = ...` counts.
+    g : (3,) m/s², in the world's axes; None: the model's own gravity if it is not zero, else (0, 0, -9.81)
+        The model's gravity is read when the scene computes, so a later `model.gravity = ...` takes effect.
     """
 
     g: Any = None
@@ -63,12 +63,12 @@ class PointMassGravity(Effect):
 
 @dataclass(repr=False, eq=False)
 class GravityGradient(Effect):
-    """What a body's extent adds to the gravity of a point mass, in the order of its inertia (MacCullagh): N = 3μ/|r|³ r̂ × I r̂ and a force.
+    """Gravity gradient of a point mass on extended bodies, to the order of the inertia (MacCullagh): N = 3μ/|r|³ r̂ × I r̂ and a force.
 
     Parameters
     ----------
     mu : m³/s²
-    position : (3,) m, the point that attracts, in the world's axes
+    position : (3,) m, the attracting point, in the world's axes
     bodies : names of bodies, patterns, or a list of them; None: all
     """
 
@@ -90,17 +90,17 @@ class GravityCompensation(Effect):
     Parameters
     ----------
     share : float or (n,)
-        Of each body's weight, one number for all or one for each body: 1 cancels it, 0 leaves it, 2 lifts the body with its weight.
+        Share of each body's weight, one number for all or one per body: 1 cancels it, 0 leaves it, 2 lifts the body with its weight.
     bodies : names of bodies, patterns, or a list of them; None: all
     points : (n, 3) m
-        Where each body is held, in its axes; the centres of mass by default.
+        Point at which each body is held, in its axes; default: the centres of mass.
     g : (3,) m/s², in the world's axes
-        The gravity that is compensated; by default the model's own where it is set, else (0, 0, -9.81).
+        The compensated gravity; default: the model's own if it is set, else (0, 0, -9.81).
 
     Raises
     ------
     ModelError
-        Unknown bodies, a wrong count of numbers, numbers that are not finite.
+        Unknown bodies, a wrong number of values, values that are not finite.
     """
 
     share: Any = 1.0

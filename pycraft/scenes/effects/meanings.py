@@ -1,4 +1,4 @@
-"""What the names and lists of numbers of effects are of: an edit of the structure that would make it something else is not silent."""
+"""Meaning of the names and lists of values of effects: structural edits that would change it raise an error."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .functions_of_time import InTime
 
 
 class Meanings:
-    """Of each effect of a scene, what it was of when it was added, or when its fields were last seen to change."""
+    """Meaning of each effect of a scene when it was added, or when its fields last changed."""
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[Effect, int, dict[str, str]]] = {}
 
     def keep(self, name: str, effect: Effect, model: Any) -> None:
-        """Remember an effect that is new or was changed. ModelError for one that is of something else now, with what it was of."""
+        """Record a new or changed effect. Raises ModelError, with the former meaning, for an effect whose meaning an edit changed."""
         now = meaning(effect, model)
         of, changes, before = self._known.get(name, (None, 0, {}))
         if of is not effect or changes != effect._changes:
@@ -28,15 +28,15 @@ class Meanings:
         for what, was in before.items():
             if (is_now := now.get(what)) != was:
                 since = f"since an edit of {model.name!r} that is {is_now}"
-                raise _core.ModelError(f"effect {name!r} of the scene {what} {was}; {since}: remove it, and add it anew")
+                raise _core.ModelError(f"effect {name!r} of the scene {what} {was}; {since}: remove it, and add it again")
 
     def forget(self, name: str) -> None:
-        """Of an effect that is taken out."""
+        """Forget a removed effect."""
         self._known.pop(name, None)
 
 
 def meaning(effect: Effect, model: Any) -> dict[str, str]:
-    """What each of its names is of in a model as it is, and which coordinates its numbers are of where they are given one by one."""
+    """Return the present meaning of each of its names in a model, and the coordinates of values given one by one."""
     named, listed = chosen(effect), _listed(effect)
     if named is None and not listed:
         return {}
@@ -48,18 +48,18 @@ def meaning(effect: Effect, model: Any) -> dict[str, str]:
 
 
 def acted_on(effect: Effect, model: Any) -> set[int]:
-    """Coordinates that it acts on as such, and not by the motions of bodies that these make."""
+    """Return the coordinates on which it acts directly, instead of through the motion of bodies."""
     made = effect.made_for(model)
     if made.coordinates or not (hasattr(effect, "hinges") or hasattr(effect, "hinge")):
         return set(made.coordinates)
     named = chosen(effect)
-    if named is None and effect.kind() == "limits":  # of all that have one
+    if named is None and effect.kind() == "limits":  # all coordinates with a limit
         return set()
     return set(_core.coordinates_named(model, named, effect.kind()))
 
 
 def chosen(effect: Effect) -> list[str] | None:
-    """Names of hinges and coordinates, and patterns, that it was given; None where it has no such, or acts on all."""
+    """Return its given names of hinges and coordinates, and patterns; None if it has none, or acts on all."""
     for value in effect.values():
         if isinstance(value, Mapping):
             return names_of(list(value), effect.kind())
@@ -67,7 +67,7 @@ def chosen(effect: Effect) -> list[str] | None:
 
 
 def _listed(effect: Effect) -> bool:
-    """Whether some of its numbers are of coordinates one by one, in their order; those that depend on time may be."""
+    """Return True if some of its values belong to single coordinates, in order; values that depend on time may."""
     if not hasattr(effect, "hinges"):
         return False
     given = effect.values(besides=("hinges", "function"))
@@ -75,7 +75,7 @@ def _listed(effect: Effect) -> bool:
 
 
 def _described(body: dict[str, Any]) -> str:
-    """Of the hinge of a body: its subhinges in any order, as it may be turned round; a free one is of the body alone."""
+    """Describe the hinge of a body: its subhinges in any order, because it may be reversed; a free hinge by its body only."""
     hinge = body["hinge"]
     if hinge["kind"] == "free":
         return f"the free hinge of body {body['name']!r}"

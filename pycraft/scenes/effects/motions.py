@@ -1,4 +1,4 @@
-"""Motions that are prescribed."""
+"""Prescribed motions."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from .functions_of_time import function_of_time
 
 @dataclass(repr=False, eq=False)
 class Prescribed(Effect):
-    """A hinge that goes where a function of time says; the forces that this takes are found, and are the effect's.
+    """A hinge that follows a function of time; the required forces are computed, and are the forces of the effect.
 
-    In a run the coordinates are the motion's, whatever state it starts from; `Scene.evaluate` takes the state as it is given, and of the
-    motion its acceleration. A coordinate that two effects prescribe is an error.
+    In a run the coordinates follow the motion, whatever the initial state; `Scene.evaluate` uses the given state, and only the acceleration
+    of the motion. Two effects that prescribe the same coordinate are an error.
 
     Parameters
     ----------
     hinge : name of a hinge or of a coordinate of one subhinge, or a list of them
-    motion : as many numbers as these have in q (a quaternion for a ball, a quaternion and a position for a free hinge)
-        Constant; a `Spline`, `Table` or `Harmonic`; a spline of SciPy's; or a function of t that gives the position, or the tuple
-        (position, velocity, acceleration), by which those of q are meant.
+    motion : as many values as these hinges have in q (a quaternion for a ball, a quaternion and a position for a free hinge)
+        Constant; a `Spline`, `Table` or `Harmonic`; a spline of SciPy's; or a function of t that returns the position, or the tuple
+        (position, velocity, acceleration), the derivatives of q.
     step : s
-        Of the differences of order 6 by which a function that gives positions alone is differentiated twice: about 1e-9 is lost of
-        accelerations at the default, for motions of seconds.
+        Step of the differences of order 6 for a function that returns only positions: the error of accelerations is about 1e-9 at the
+        default, for motions over seconds.
     """
 
     _example = 'pc.effects.Prescribed("elbow", pc.effects.Harmonic(0.5, 2.0))'

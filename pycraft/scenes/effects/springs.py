@@ -21,9 +21,9 @@ class Spring(Effect):
     Parameters
     ----------
     stiffness : N m/rad or N/m
-        One number, one for each coordinate, or a dictionary by hinge. A ball has one stiffness. A negative one is warned of.
+        One number, one for each coordinate, or a dictionary by hinge. A ball has one stiffness. A negative value causes a warning.
     rest : rad or m, quaternions of balls
-        One number, or as many as these hinges have in q; 0: all at zero.
+        One number, or as many values as these hinges have in q; 0: all at zero.
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all but free ones
     """
 
@@ -41,17 +41,17 @@ class Spring(Effect):
 
 @dataclass(repr=False, eq=False)
 class ImplicitSpring(Effect):
-    """Springs at pins, sliders and screws that steps of one size take implicitly: D has h² k in addition, stable for any step and any k.
+    """Springs at pins, sliders and screws, implicit in fixed steps: they add h² k to D, stable for any step and any k.
 
-    Integrators that solve for their steps ("rosenbrock4", "radau", ...) and `Scene.evaluate` without a step see plain springs,
-    T = -k (q - rest); explicit ones refuse them.
+    Implicit integrators ("rosenbrock4", "radau", ...) and `Scene.evaluate` without a step use plain springs,
+    T = -k (q - rest); explicit integrators refuse them.
 
     Parameters
     ----------
     stiffness : N m/rad or N/m
         One number, one for each coordinate, or a dictionary by hinge; not negative.
     rest : rad or m, one number or one for each coordinate
-    hinges : names of hinges, coordinates, patterns, or a list of them; None: all that can have one
+    hinges : names of hinges, coordinates, patterns, or a list of them; None: all pins, sliders and screws
     """
 
     _example = "pc.effects.ImplicitSpring(100.0)"
@@ -66,20 +66,20 @@ class ImplicitSpring(Effect):
 
     def at_states(self, model: _core.Multibody) -> Spring:
         names, values = by_hinge(self.stiffness, self.hinges, model, "implicit_spring", "stiffness")
-        if names is None:  # a plain spring would take the balls, too
+        if names is None:  # a plain spring would include the balls
             names = [name for j, name in enumerate(model.coordinate_names) if _core.numbers_in_q(model, [j]) == 1]
         return Spring(values[0] if len(values) == 1 else values, self.rest, names)
 
 
 @dataclass(repr=False, eq=False)
 class NodeSpring(Effect):
-    """A spring between two nodes, of the force k (L - length) along the line between their origins. Potential ½ k (L - length)².
+    """A spring between two nodes, with the force k (L - length) along the line between their origins. Potential ½ k (L - length)².
 
     Parameters
     ----------
     node_a, node_b : names of nodes or bodies; None: the base
     stiffness : N/m
-    length : m, where it is slack; 0: linear in all directions
+    length : m, natural length; 0: linear in all directions
     """
 
     _example = 'pc.effects.NodeSpring("hand", None, stiffness=100.0)'
@@ -97,7 +97,7 @@ class NodeSpring(Effect):
 
 @dataclass(repr=False, eq=False)
 class NodeDamper(Effect):
-    """A damper between two nodes, of the force c L̇ along the line between their origins.
+    """A damper between two nodes, with the force c L̇ along the line between their origins.
 
     Parameters
     ----------
@@ -119,14 +119,15 @@ class NodeDamper(Effect):
 
 @dataclass(repr=False, eq=False)
 class Bushing(Effect):
-    """A spring and damper in six dimensions between two nodes, of K ξ + C ξ̇, ξ = (rotation vector; position) of b in a. Potential ½ ξ* K ξ.
+    """A spring and damper in six dimensions between two nodes, with the wrench K ξ + C ξ̇, ξ = (rotation vector; position) of b in a.
+    Potential ½ ξ* K ξ.
 
     Parameters
     ----------
     node_a, node_b : names of nodes or bodies; None: the base
     stiffness : (6,) or (6, 6), N m/rad and N/m, rotations first, in the axes of a at rest; symmetric
     damping : (6,) or (6, 6), N m s/rad and N s/m
-    rest : (4, 4), the pose of b in a where nothing is stretched; None: the same place
+    rest : (4, 4), the pose of b in a without deformation; None: coinciding frames
     """
 
     _example = 'pc.effects.Bushing("hand", None, stiffness=1000.0)'

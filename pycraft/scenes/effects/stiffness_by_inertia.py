@@ -1,4 +1,4 @@
-"""Stiffness that effects take from a model where none is given: by the inertia at each coordinate and a frequency."""
+"""Default stiffness of effects, from the inertia at each coordinate and a frequency."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ... import _core
 
 
 def stiffness_by_inertia(model: Any, coordinates: Sequence[int], frequency: float, effect: str) -> np.ndarray:
-    """Return ω² (ℳ + J)_jj of coordinates, at the model's zero configuration: each by itself then swings with ω.
+    """Return ω² (ℳ + J)_jj of coordinates, at the model's zero configuration: each alone then oscillates with ω.
 
-    Under an acceleration of free fall α it gives way by about α/ω², at any size and mass of the model.
+    Under an acceleration of free fall α it deflects by about α/ω², for any size and mass of the model.
 
     Parameters
     ----------
     coordinates : indices of v
     frequency : ω in rad/s
-    effect : what errors call it
+    effect : its name in errors
 
     Returns
     -------
@@ -37,6 +37,6 @@ def stiffness_by_inertia(model: Any, coordinates: Sequence[int], frequency: floa
         if not each > 0:
             name = model.coordinate_names[j]
             raise _core.ModelError(
-                f"{effect}: coordinate {name!r} of {model.name!r} moves no mass at q = 0, from which a stiffness would follow; give it"
+                f"{effect}: coordinate {name!r} of {model.name!r} moves no mass at q = 0, so there is no default stiffness; give stiffness="
             )
     return frequency**2 * inertia

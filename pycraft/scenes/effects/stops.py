@@ -12,27 +12,27 @@ from .effect import Effect, names_of, numbers_of
 from .stiffness_by_inertia import stiffness_by_inertia
 
 FREQUENCY = 150.0
-"""rad/s, of a coordinate against its stop where no stiffness is given."""
+"""Default frequency of a coordinate against its stop, rad/s, if no stiffness is given."""
 
 
 @dataclass(repr=False, eq=False)
 class Limits(Effect):
     """Compliant stops at pins, sliders and screws (Hunt and Crossley): with d > 0 beyond a limit, k d max(0, 1 + a ḋ) back towards it.
 
-    Potential ½ k d²; what is lost is work.
+    Potential ½ k d²; the dissipated energy is work of the effect.
 
     Parameters
     ----------
     stiffness : N m/rad or N/m, k; one number or one for each coordinate
-        None: ω² (ℳ + J)_jj at q = 0 with ω = 150 rad/s. A bounce then lasts about 20 ms, and a stop gives way by about g/ω² = 0.4 mm
+        None: ω² (ℳ + J)_jj at q = 0 with ω = 150 rad/s. A bounce then lasts about 20 ms, and a stop deflects by about g/ω² = 0.4 mm
         under a body's own weight.
     dissipation : s/rad or s/m, a; one number or one for each coordinate
-    lower, upper : rad or m, one number or one for each coordinate; None: those of the model's hinges (`hinge.limits`)
+    lower, upper : rad or m, one number or one for each coordinate; None: the limits of the model's hinges (`hinge.limits`)
     hinges : names of hinges, coordinates, patterns, or a list of them; None: all that have a limit
-    restitution : (e, v), in the place of `dissipation`
-        What meets a stop at the speed v, rad/s or m/s, leaves it at e v, 0 < e ≤ 1, where the stop is all that acts; each of the two one
-        number or one for each coordinate. Then a = α/v with α(1 + e) = ln((1 + α)/(1 - αe)), whatever the stiffness and the mass.
-        Slower ones lose a smaller share.
+    restitution : (e, v), instead of `dissipation`
+        A coordinate that meets a stop at the speed v, rad/s or m/s, leaves it at e v, 0 < e ≤ 1, if only the stop acts; each value is one
+        number or one per coordinate. Then a = α/v with α(1 + e) = ln((1 + α)/(1 - αe)), whatever the stiffness and the mass.
+        Slower impacts lose a smaller share.
 
     Source: K. H. Hunt, F. R. E. Crossley, J. Applied Mechanics 42, 1975; α follows by integrating v dv/(1 + a v) from v to -e v.
     """
@@ -65,10 +65,10 @@ class Limits(Effect):
         if self.restitution is None:
             return given
         if any(given):
-            raise _core.ModelError("limits: dissipation and restitution say the same thing in two ways; give one of them")
+            raise _core.ModelError("limits: give either dissipation or restitution, not both")
         if not isinstance(self.restitution, Sequence) or len(self.restitution) != 2:
             raise _core.ModelError(
-                f"limits: restitution is a pair (e, v), a coefficient and the speed where it holds, not {self.restitution!r:.80}"
+                f"limits: restitution must be a pair (e, v), a coefficient and the speed at which it holds, not {self.restitution!r:.80}"
             )
         shares, speeds = (
             numbers_of(part, f"limits: {what} of restitution") for part, what in zip(self.restitution, ("e", "v"), strict=True)
@@ -82,13 +82,13 @@ class Limits(Effect):
 
 
 def dissipation(e: float, v: float) -> float:
-    """The a of a stop that gives back e v of a speed v: α/v, α(1 + e) = ln((1 + α)/(1 - αe)), by bisection. ModelError for others."""
+    """Return a of a stop that returns a speed v as e v: α/v, α(1 + e) = ln((1 + α)/(1 - αe)), by bisection; else raises ModelError."""
     if not 1e-300 < e <= 1:
         raise _core.ModelError(f"limits: a coefficient of restitution is above 0 and no more than 1, not {e:g}")
     if not 0 < v < float("inf"):
         raise _core.ModelError(f"limits: restitution holds at a speed v that is positive and finite, not {v:g}")
     low, high = 0.0, 1.0 / e
-    for _ in range(200):  # more than it takes until the two are neighbours
+    for _ in range(200):  # more than enough until the two are neighbouring doubles
         middle = (low + high) / 2
         if middle * e < 1 and _log_beyond(middle) < _log_beyond(-middle * e):
             low = middle
@@ -98,7 +98,7 @@ def dissipation(e: float, v: float) -> float:
 
 
 def _log_beyond(x: float) -> float:
-    """ln(1 + x) - x, to rounding of its own for a small x."""
+    """Return ln(1 + x) - x, accurate to its own rounding for small x."""
     if abs(x) > 0.1:
         return log1p(x) - x
     term, total = x, 0.0

@@ -14,7 +14,7 @@ from .effect import Effect, names_of, numbers_of
 
 
 class EffectState:
-    """A state as a user's effect sees it: `t`, `q` (nq,), `v` (nv,), `states` of its own; poses, velocities and Jacobians of nodes."""
+    """The state passed to a user's effect: `t`, `q` (nq,), `v` (nv,), its own `states`; poses, velocities and Jacobians of nodes."""
 
     __slots__ = ("_model", "q", "states", "t", "v")
 
@@ -22,20 +22,20 @@ class EffectState:
         self._model, self.t, self.q, self.v, self.states = model, t, q, v, states
 
     def pose(self, node: str) -> np.ndarray:
-        """X_WN (4, 4) of a node or body."""
+        """Return X_WN (4, 4) of a node or body."""
         return self._model.pose(node, self.q)
 
     def jacobian(self, node: str, axes: str = "body") -> np.ndarray:
-        """𝒥 (6, nv), as `Multibody.jacobian`; 𝒥* w is a wrench w in the same axes as generalized forces."""
+        """Return 𝒥 (6, nv), as `Multibody.jacobian`; 𝒥* w are the generalized forces of a wrench w in the same axes."""
         return self._model.jacobian(node, self.q, axes=axes)
 
     def twist(self, node: str, axes: str = "body") -> np.ndarray:
-        """The velocity (6,) of a node or body, angular first."""
+        """Return the velocity (6,) of a node or body, angular first."""
         return self.jacobian(node, axes) @ self.v
 
 
 class _Forces:
-    """A user's function as the core calls it: forces of all coordinates as an array."""
+    """A user's function, adapted to the core: it returns forces of all coordinates as an array."""
 
     def __init__(self, model: _core.Multibody, function: Callable[..., Any], kind: str):
         self.model, self.function, self.kind = model, function, kind
@@ -71,15 +71,15 @@ class _Sampled:
 
 @dataclass(repr=False, eq=False)
 class UserEffect(Effect):
-    """Forces by a function of Python's. `scene.add(function)` makes one of any callable that is no effect.
+    """Forces from a Python function. `scene.add(function)` makes one from any callable that is not an effect.
 
     Parameters
     ----------
     function : callable (t, state) -> forces
-        An array (nv,) of generalized forces, or a dictionary of them by hinge or coordinate; `state` is an `EffectState`. Numbers that are
-        not finite are an error that names the effect and the time.
-    states : what the effect's own states are at first; without it the function's attribute `states`, if it has one
-    rates : callable (t, state) -> rates of these; without it the function's method `rates`
+        An array (nv,) of generalized forces, or a dictionary of them by hinge or coordinate; `state` is an `EffectState`. Values that are
+        not finite raise an error that names the effect and the time.
+    states : initial values of the effect's own states; default: the function's attribute `states`, if it has one
+    rates : callable (t, state) -> rates of these states; default: the function's method `rates`
     """
 
     _example = "pc.effects.UserEffect(lambda t, state: -0.1 * state.v)"
@@ -91,17 +91,19 @@ class UserEffect(Effect):
     def made_for(self, model: _core.Multibody) -> _core.Effect:
         kind = kind_of(self.function)
         if not callable(self.function):
-            raise _core.ModelError(f"an effect of a user's is a callable (t, state) -> forces, not {self.function!r:.80}")
+            raise _core.ModelError(f"UserEffect takes a function (t, state) -> forces, not {self.function!r:.80}")
         states = numbers_of(self.states if self.states is not None else getattr(self.function, "states", ()), f"{kind}: states")
         rates = self.rates if self.rates is not None else getattr(self.function, "rates", None)
         if states and not callable(rates):
-            raise _core.ModelError(f"effect {kind!r} has {len(states)} states of its own and no rates(t, state) that says how they change")
+            raise _core.ModelError(
+                f"effect {kind!r} has {len(states)} states of its own but no rates(t, state), which gives their derivatives"
+            )
         forces, change = _Forces(model, self.function, kind), _Rates(model, rates, kind) if states and callable(rates) else None
         return _core.python_effect(model, kind, list(range(model.nv)), forces, change, states, None, 0.0)
 
 
 def kind_of(function: Any) -> str:
-    """What an effect of this callable is called."""
+    """Return the name of an effect of this callable."""
     import re
 
     name = getattr(function, "__name__", type(function).__name__)
@@ -110,7 +112,7 @@ def kind_of(function: Any) -> str:
 
 @dataclass(repr=False, eq=False)
 class Sampled(Effect):
-    """A controller that is called every `period` seconds and whose forces stay until it is called again (zero-order hold).
+    """A controller called every `period` seconds; its forces are held until the next call (zero-order hold).
 
     It is called at the start of a run and at every whole multiple of the period; integrators end a step there.
 
@@ -132,6 +134,6 @@ class Sampled(Effect):
         if not 0 < period < np.inf:
             raise _core.ModelError(f"sampled: period is {period:g}; it is a positive number of seconds")
         if not callable(self.function):
-            raise _core.ModelError(f"sampled: a controller is a callable (t, state) -> forces, not {self.function!r:.80}")
+            raise _core.ModelError(f"sampled: the controller must be a function (t, state) -> forces, not {self.function!r:.80}")
         coordinates = _core.coordinates_named(model, names_of(self.hinges, "sampled"), "sampled")
         return _core.python_effect(model, "sampled", coordinates, None, None, [], _Sampled(model, self.function), period)

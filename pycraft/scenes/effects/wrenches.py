@@ -20,7 +20,7 @@ class Wrench(Effect):
     wrench : (6,) N m and N, the moment first
         Constant, a `Table`, `Spline` or `Harmonic`, or a function of t.
     axes : {"world", "body"} or the name of a node or body
-        Those in which it is given: the world's, those of the body that carries the node, or any node's.
+        Axes of the wrench: the world's, the axes of the body that carries the node, or any node's.
     """
 
     _example = 'pc.effects.Wrench("hand", [0, 0, 0, 0, 0, 1.0])'

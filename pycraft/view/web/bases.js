@@ -57,5 +57,5 @@ function show(base) {
 byId("base").max = told.bases.length - 1;
 byId("base").addEventListener("input", (event) => show(+event.target.value));
 byId("look").addEventListener("click", () => figure.look());
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(+byId("base").value));
+onTheme(() => show(+byId("base").value));
 show(0);

@@ -7,10 +7,10 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const along = (a, s, b) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
 
-// Colours of the style sheet by name, looked up once, and again when the system's mode changes.
+// Colours of the style sheet by name, looked up once, and again when the theme changes.
 let colours = {};
 const colourOf = (name) => (colours[name] ??= getComputedStyle(document.documentElement).getPropertyValue(name).trim());
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = {}; });
+onTheme(() => { colours = {}; });
 
 // Single-precision numbers from text, little-endian as every browser's machine.
 function numbers(text) {
@@ -134,7 +134,7 @@ class Figure {
       this.zoomAt(event.offsetX, event.offsetY, Math.exp(-0.0012 * event.deltaY));
     }, { passive: false });
     canvas.addEventListener("dblclick", () => this.look());
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    onTheme(() => this.draw());
   }
 
   release(held) {

@@ -140,5 +140,5 @@ byId("back").addEventListener("click", () => { stop(); show(Math.max(0, now - 1)
 byId("next").addEventListener("click", () => { stop(); show(Math.min(last, now + 1)); });
 byId("pace").addEventListener("change", () => { if (timer) { stop(); start(); } });
 new ResizeObserver(drawTrack).observe(track);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawTrack);
+onTheme(drawTrack);
 show(last);

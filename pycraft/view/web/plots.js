@@ -27,7 +27,7 @@ class Plot {
       chosen(first + (last - first) * Math.max(0, Math.min(1, (event.offsetX - left) / (right - left))));
     });
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    onTheme(() => this.draw());
   }
 
   set(t, lines, marks = []) {
