@@ -7,6 +7,21 @@ import pycraft as pc
 
 from .operators import example, plain
 
+_FACTORIZATION = (
+    "G. Rodriguez and K. Kreutz-Delgado, *Spatial Operator Factorization and Inversion of the Manipulator Mass Matrix*, "
+    "IEEE Transactions on Robotics and Automation 8(1), 1992"
+)
+_SENSITIVITY = (
+    "A. Jain and G. Rodriguez, *Multibody Mass Matrix Sensitivity Analysis Using Spatial Operators*, "
+    "International Journal for Multiscale Computational Engineering 1(2-3), 2003"
+)
+ALSO = {
+    "innovations factorization": _FACTORIZATION,
+    "innovations factor inverted": _FACTORIZATION,
+    "mass matrix inverse": _FACTORIZATION,
+    "∂ℳ, single-DOF form": _SENSITIVITY,
+}
+"""Public papers whose abstracts state a theorem, or what it is: by the theorem's name. Equation numbers are given of none."""
 USES = {"check": "", "rewrite": "a rule of simplification", "inverse": "a rule by which the planner inverts"}
 
 
@@ -24,7 +39,12 @@ def entry(number: int, theorem: Any) -> str:
     where = [*theorem.hypotheses, *(["between bodies on one path from the root"] if theorem.on_one_path else [])]
     said = [f"Holds where {', '.join(where)}" if where else "No hypothesis"]
     said += [USES[theorem.use]] if USES.get(theorem.use) else []
-    parts = [f"(theorem-{number})=\n## {plain(theorem.name)}", f"$$\n{theorem.latex}\n$$", f"{'; '.join(said)}. {source(theorem.source)}."]
+    also = f"; {ALSO[theorem.name]}" if theorem.name in ALSO else ""
+    parts = [
+        f"(theorem-{number})=\n## {plain(theorem.name)}",
+        f"$$\n{theorem.latex}\n$$",
+        f"{'; '.join(said)}. {source(theorem.source)}{also}.",
+    ]
     proof = pc.prove(theorem.lhs, theorem.rhs)
     if proof:
         parts += [f"<details><summary>Proof</summary>\n\n```text\n{str(proof).strip()}\n```\n\n</details>"]

@@ -22,6 +22,7 @@ from .attempt import Attempt, Outcome
 from .axioms import theory
 from .cases import by_cases
 from .completion import complete
+from .definite import prove_inequality
 from .derivation import DerivativeProblem
 from .derivative import TIME, Formula, derivative
 from .equations import Equation, Step, joined, numbered, opened
@@ -104,6 +105,8 @@ def prove(
     else:
         read = Statement(*_sides(lhs, rhs), "", "expressions")
         read_on = reading(operators_of(model) if model is not None else _letters_of(read), define)
+    if read.relation != "=":
+        return by_cases(assume, lambda case: prove_inequality(read, model, assumptions(read_on, case)))
     proof = by_cases(assume, lambda case: _prove(read, model, assumptions(read_on, case), read_on.unknown))
     if texts and not proof and not proof.note and _has_rates(read):  # a longer route with other rules
         longer = reading(read_on.operators, define, written_out=True)

@@ -102,7 +102,7 @@ class Reading:
     def read(self, text: str) -> Statement:
         """Read both sides. N remains the trace of I: a proof holds for every model, so no model's number of coordinates may enter."""
         try:
-            return self._statements({"N": _core.identity(self.operators.Theta).trace()}).read(text, self.definitions)
+            return self._statements({"N": _core.identity(self.operators.Theta).trace()}).read(text, self.definitions, inequalities=True)
         except ParseError as error:
             if re.search(r"\bN\b", text) and "N" not in {*self.extra, *(d.name for d in self.definitions)}:
                 raise ParseError(

@@ -229,3 +229,10 @@ def test_citation_and_package_say_the_same():
     version = re.search(r'^version = "(.*)"$', project, re.M)[1]
     assert f"\nversion: {version}\n" in cff and f"version = {{{version}}}" in (contents.ROOT / "docs" / "cite.md").read_text()
     assert pc.__version__ == version
+
+
+def test_public_papers_are_cited_where_a_theorem_is_theirs(pages):
+    names = {theorem.name for theorem in operators.example().soa.theorems()}
+    whole = "\n".join(pages.values())
+    assert {*theorems.ALSO} <= names and all(paper in whole for paper in theorems.ALSO.values())
+    assert "soa.md" not in whole and not re.search(r"Source:[^\n]*\bequation \d", whole)
