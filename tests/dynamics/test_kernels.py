@@ -144,6 +144,30 @@ def test_instruction_sets_agree(tmp_path):
             assert np.abs(value - baseline).max() <= size * np.abs(baseline).max(), f"{name}: {case}"
 
 
+REFINED = """
+import sys
+sys.path.insert(0, {folder!r})
+import numpy as np
+from support.kernel_cases import MODELS, states
+model = next(m for m in MODELS.values() if m.nv > 3)
+Q, V, U = states(model, 3)
+kept = {{form: model.forward_dynamics(Q, V, U, form=form, refine=1) for form in ("fast", "ud", "square-root")}}
+np.savez({file!r}, exact=model.forward_dynamics(Q, V, U, precision="quad"), **kept)
+"""
+
+
+def test_refined_calls_without_kernels(tmp_path):
+    """The baseline of x86-64 has kernels for the plain calls alone; the recursions refine there, as exactly."""
+    file = tmp_path / "refined.npz"
+    done = run_with("baseline", REFINED.format(folder=pathlib.Path(kernel_cases.__file__).parents[1].as_posix(), file=file.as_posix()))
+    assert done.returncode == 0, done.stderr
+    kept = dict(np.load(file))
+    exact = kept.pop("exact")
+    assert len(kept) == 3
+    for form, accelerations in kept.items():
+        assert np.abs(accelerations - exact).max() <= 1e-12 * np.abs(exact).max(), form
+
+
 def test_an_unknown_instruction_set_is_named():
     done = run_with("sse9", "import pycraft as pc; pc.instruction_set()")
     assert done.returncode != 0
