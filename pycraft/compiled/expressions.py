@@ -23,6 +23,7 @@ class ExpressionGraph:
     graph, results : the nodes of the result, in its shape
     arguments : names and widths of the inputs: q and v of the model whose state is free, x, named vectors
     model : the model whose state is free; None where everything is bound
+    on_loops : True where letters have values on the loops of the model alone
     vectors : the names of named vectors
     """
 
@@ -30,7 +31,9 @@ class ExpressionGraph:
         if request not in REQUESTS:
             raise _core.EvaluationError(f"compile() makes {', '.join(map(repr, REQUESTS))}, not {request!r}")
         scalar = isinstance(expression, _core.Scalar)
-        self.model = _free_model(expression.operands() if scalar else [expression])
+        sources = _core.unbound_sources(expression.operands() if scalar else [expression])
+        self.model = _model_of(sources)
+        self.on_loops = any((source.derived_from or ("",))[0] == "embedded loops" for source in sources)
         tape, arrays, rows, columns = self._recorded(expression, request, most)
         self.graph, results = graph_of(tape, [_argument(what, name) for what, name, _ in arrays])
         self.results = results.reshape(self._shape(expression, request, rows, columns))
@@ -50,21 +53,25 @@ class ExpressionGraph:
 
     def _recorded(self, expression: Any, request: str, most: int) -> Any:
         """Return the tape recorded near the model's own state, or at another where no tape can be recorded there."""
-        states = states_to_record(self.model) if self.model is not None else [None]
-        for last, state in enumerate(states, 1 - len(states)):
-            bound = expression if state is None else expression.at(state.q[None], state.v[None])
+        if self.model is None:
+            return _tape(expression, request, most)
+        refusal: Exception
+        for state in states_to_record(self.model, self.on_loops):
             try:
-                return _core.scalar_tape(bound, most) if isinstance(bound, _core.Scalar) else bound.plan(request).tape(most)
-            except _core.Error:
-                if last == 0:
-                    raise
-        raise AssertionError  # there is a state at least
+                return _tape(expression.at(state.q[None], state.v[None]), request, most)
+            except _core.Error as error:
+                refusal = error
+        raise refusal
 
     @staticmethod
     def _shape(expression: Any, request: str, rows: int, columns: int) -> tuple[int, ...]:
         if isinstance(expression, _core.Scalar) or request in ("trace", "logdet", "norm"):
             return ()
         return (rows, columns) if request == "dense" else (rows,)
+
+
+def _tape(bound: Any, request: str, most: int) -> Any:
+    return _core.scalar_tape(bound, most) if isinstance(bound, _core.Scalar) else bound.plan(request).tape(most)
 
 
 def _argument(what: str, name: str) -> str:
@@ -75,11 +82,10 @@ def _is_vector(expression: Any) -> bool:
     return expression.domain == _core.euclidean(1)
 
 
-def _free_model(operands: list[Any]) -> Any:
-    """Return the model whose state is not bound, None where all are bound. EvaluationError where there are two."""
+def _model_of(sources: list[Any]) -> Any:
+    """Return the model of the sources, None where no source moves. EvaluationError where there are two."""
     models: list[Any] = []
-    for source in _core.unbound_sources(operands):
-        model = source.model
+    for model in (source.model for source in sources):
         if model is not None and not any(model is known for known in models):
             models.append(model)
     if len(models) > 1:

@@ -3,11 +3,13 @@ dynamics on loops does at a state on them (cpp/dynamics/recorded_on_loops.h)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from .. import _core
+from ..state import State
 from .graph import Graph
 from .tapes import graph_of
 
@@ -44,12 +46,12 @@ def frame_graph(model: Any, call: str, frame: str) -> tuple[Graph, np.ndarray]:
     return graph, results.reshape((4, 4) if call == "pose" else (6, model.nv))
 
 
-def states_to_record(model: Any) -> list[Any]:
-    """Return states to record at, on the loops of the model: near its own state, then others; special states decide as no others do."""
+def states_to_record(model: Any, on_loops: bool) -> Iterator[Any]:
+    """Yield states to record at: near the model's own, then others; special states decide as no others do."""
     rng = np.random.default_rng(0)
-    near = model.integrate(model.q, rng.uniform(-BESIDE, BESIDE, model.nv))
-    starts = [(near, rng.uniform(-1, 1, model.nv)), *((s.q, s.v) for s in (model.random_state(k) for k in (1, 2)))]
-    return [model.assemble(q, v) for q, v in starts]
+    starts = [State(model.integrate(model.q, rng.uniform(-BESIDE, BESIDE, model.nv)), rng.uniform(-1, 1, model.nv))]
+    for start in (*starts, *(model.random_state(k) for k in (1, 2))):
+        yield model.assemble(start.q, start.v) if on_loops else start
 
 
 def loops_graph(model: Any, most: int) -> tuple[Graph, np.ndarray]:
@@ -57,5 +59,5 @@ def loops_graph(model: Any, most: int) -> tuple[Graph, np.ndarray]:
 
     ModelError where `most` operations are not enough, or the loops have what cannot be compiled, or cannot be assembled.
     """
-    state = states_to_record(model)[0]
+    state = next(states_to_record(model, on_loops=True))
     return graph_of(model.loops._core.tape(state.q, state.v, np.random.default_rng(1).uniform(-1, 1, model.nv), most), ["q", "v", "tau"])
