@@ -6,10 +6,9 @@ import sys
 
 import numpy as np
 import pytest
-from pycraft.compiled.frames import frame_graph
 
 import pycraft as pc
-from pycraft.compiled.kernels import INPUTS, kernel_graph
+from pycraft.compiled.kernels import INPUTS, frame_graph, kernel_graph
 from support import kernel_cases
 from support.graphs import evaluated
 from support.kernel_cases import MODELS, STATES, calls
