@@ -239,7 +239,7 @@ def test_the_realization_of_a_batch():
         (dict(refine=-1), "refine=-1"),
         (dict(refine=1.0), "refine=1.0"),
         (dict(refine=1, residual="wider", precision=100), "nothing is wider than 100 digits"),
-        (dict(method=3), "method=3: a name"),
+        (dict(method=3), "method=3: give a name"),
     ],
 )
 def test_options_that_make_no_sense(options, words):

@@ -225,7 +225,7 @@ def test_looks_like_a_method():
     call = pc.Multibody.forward_dynamics
     assert list(inspect.signature(call).parameters)[:4] == ["self", "q", "v", "tau"]
     assert list(inspect.signature(pc.chain(1).forward_dynamics).parameters)[:3] == ["q", "v", "tau"]
-    assert inspect.getdoc(call).startswith("Accelerations v̇") and inspect.isroutine(call)
+    assert inspect.getdoc(call).startswith("Return accelerations v̇") and inspect.isroutine(call)
     assert call.__name__ == "forward_dynamics" and "forward_dynamics" in repr(pc.chain(1).forward_dynamics)
     assert call.__module__ == "pycraft.dynamics.direct_calls" and call.__qualname__ == "DirectCalls.forward_dynamics"
     parameters = inspect.signature(call).parameters

@@ -140,7 +140,6 @@ def test_pickled_with_their_model():
         (lambda m: m.soa.grouped([["body0", "body1"]]).Q, "whole model"),
         (lambda m: m.soa.free(["hinge1"]).A, "whole model"),
         (lambda m: m.soa.Q.algorithm(), "no recursion is written for Q, the rows of loops"),
-        (lambda m: m.soa.Q.compile(), "no recursion is written for Q, the rows of loops"),
         (lambda m: m.soa.Q.at([0.0, np.nan, 0.0]).dense(), "hinge1"),
     ],
 )
