@@ -231,7 +231,7 @@ def test_looks_like_a_method():
     parameters = inspect.signature(call).parameters
     assert parameters["form"].default == "fast" and parameters["q"].default is None and call.__kwdefaults__ == {"threads": 1}
     for text in (pydoc.render_doc(call), pydoc.render_doc(pc.Multibody)):
-        assert "on_singular: 'str' = 'raise'" in text and "Accelerations v̇ under generalized forces" in text
+        assert "on_singular: 'str' = 'raise'" in text and "Return accelerations v̇ under generalized forces" in text
     with pytest.raises(TypeError):
         type(call)()
 
