@@ -63,7 +63,7 @@ def test_the_block_of_pinocchio(tmp_path, monkeypatch):
 @pytest.mark.peers
 def test_the_gravity_of_the_packages():
     pinocchio, mujoco = pytest.importorskip("pinocchio"), pytest.importorskip("mujoco")
-    row = re.search(r"\| gravity.*", PAGE).group(0)
+    row = re.search(r"\| default gravity.*", PAGE).group(0)
     assert row.split("|")[2].strip() == "zero" and not pc.chain(1).gravity.any()
     assert row.split("|")[3].strip() == "(0, 0, -9.81)" and np.array_equal(pinocchio.Model().gravity.linear, [0, 0, -9.81])
     assert np.array_equal(mujoco.MjModel.from_xml_string("<mujoco/>").opt.gravity, [0, 0, -9.81])

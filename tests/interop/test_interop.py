@@ -135,7 +135,7 @@ def test_what_pinocchio_and_mujoco_are_handed(given):
         export.mujoco_peer(given)
     with pytest.raises(pc.ModelError, match="order takes an MjModel, not"):
         mujoco.order(pc.chain(1), given)
-    with pytest.raises(pc.ModelError, match="is no file"):
+    with pytest.raises(pc.ModelError, match="is not a file"):
         pinocchio.build(given)
 
 
