@@ -1590,7 +1590,7 @@ def forms() -> list[str]:
     """
     The forms of the articulated-inertia sweep.
     """
-def frame_tape(model: Multibody, call: str, frame: str) -> tuple:
+def frame_tape(model: Multibody, call: str, frame: str, most: typing.SupportsInt | typing.SupportsIndex) -> tuple:
     """
     The pose (4, 4) or the Jacobian (6, nv) of a body or node, operation by operation.
     """

@@ -8,8 +8,8 @@
 #include "bindings/tapes.h"
 #include "kernels/link_model.h"
 #include "kernels/taped_calls.h"
-#include "recursions/recorded_frames.h"
 #include "model/multibody.h"
+#include "recursions/recorded_frames.h"
 #include <structmember.h>  // after Python.h
 
 namespace pycraft {
@@ -159,10 +159,10 @@ py::object tape(const Multibody& model, const std::string& call) {
 void register_compiled(py::module_& m) {
   m.def("kernel_tape", &tape, py::arg("model"), py::arg("call"),
         "What the kernel of a direct call does for this model, operation by operation; None where no kernel knows the model's hinges.");
-  m.def("frame_tape", [](const Multibody& model, const std::string& call, const std::string& frame) {
+  m.def("frame_tape", [](const Multibody& model, const std::string& call, const std::string& frame, size_t most) {
     const Node node = model.node(model.node_index(frame));
-    return plain_tape(call == "pose" ? recorded_pose(model, node) : recorded_jacobian(model, node));
-  }, py::arg("model"), py::arg("call"), py::arg("frame"), "The pose (4, 4) or the Jacobian (6, nv) of a body or node, operation by operation.");
+    return plain_tape(call == "pose" ? recorded_pose(model, node, most) : recorded_jacobian(model, node, most));
+  }, py::arg("model"), py::arg("call"), py::arg("frame"), py::arg("most"), "The pose (4, 4) or the Jacobian (6, nv) of a body or node, operation by operation.");
   m.def("compiled_call", &compiled_call, py::arg("behind"), py::arg("library"), py::arg("function"), py::arg("widths"), py::arg("lengths"), py::arg("work"),
         "The callable of a built library; `behind` is called where arguments are not contiguous float64 arrays, or results in doubt.");
   m.def("kernel_headers", [] {

@@ -7,12 +7,12 @@
 namespace pycraft {
 
 // What every operation does; the three that it takes, of an input the entry and the number of its array; its number; the operation of every
-// result; guards, each a truth and whether it holds.
+// result; guards, each a truth and whether it holds; the operations that must be finite.
 inline py::tuple plain_tape(const kernels::Tape& tape) {
   const auto n = static_cast<py::ssize_t>(tape.operations.size());
   py::array_t<int> taken({n, py::ssize_t(3)});
   py::array_t<double> number(n);
-  py::list what, guards, results;
+  py::list what, guards, results, finite;
   const std::vector<py::str> names(std::begin(kernels::names_of_operations), std::end(kernels::names_of_operations));
   for (py::ssize_t i = 0; i < n; ++i) {
     const kernels::Operation& o = tape.operations[i];
@@ -21,7 +21,8 @@ inline py::tuple plain_tape(const kernels::Tape& tape) {
   }
   for (const kernels::TapedResult& r : tape.results) results.append(r.from);
   for (const kernels::Guard& g : tape.guards) guards.append(py::make_tuple(g.truth, g.holds));
-  return py::make_tuple(what, taken, number, results, guards);
+  for (const int i : tape.finite) finite.append(i);
+  return py::make_tuple(what, taken, number, results, guards, finite);
 }
 
 }  // namespace pycraft

@@ -1,4 +1,5 @@
-// The pose or the Jacobian of a frame in the base as a tape, a function of q: what source is written of (pycraft/compiled).
+// The pose or the Jacobian of a frame in the base as a tape, a function of q: what source is written of (pycraft/compiled). EvaluationError where
+// more than `most` operations would be written down.
 #pragma once
 
 #include "lanes/tape.h"
@@ -7,8 +8,8 @@
 namespace pycraft {
 
 // X (4 x 4), X = X(0,1) ... X(p,k) X(k,node), row after row.
-kernels::Tape recorded_pose(const Multibody& model, const Node& frame);
+kernels::Tape recorded_pose(const Multibody& model, const Node& frame, size_t most);
 // 𝒥 (6 x nv) in the frame's own axes about its origin, row after row: 𝒥_i = φ*(k,node) H*_i.
-kernels::Tape recorded_jacobian(const Multibody& model, const Node& frame);
+kernels::Tape recorded_jacobian(const Multibody& model, const Node& frame, size_t most);
 
 }  // namespace pycraft

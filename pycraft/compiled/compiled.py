@@ -92,7 +92,7 @@ def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
         raise _core.EvaluationError(f"{call} needs a frame: compile({call!r}, frame=...)" if frame is None else f"{call} takes no frame")
     held = copy.deepcopy(model)  # later edits change neither the compiled code nor its replacement
     if call == ON_LOOPS:
-        graph, results = loops_graph(held, 4 * MOST_OPERATIONS)  # includes operations that no result needs
+        graph, results = loops_graph(held, 4 * MOST_OPERATIONS)  # operations that no result needs are recorded as well
         ordinary, name = partial(_on_loops, held), call
     elif frame is None:
         graph, results = kernel_graph(held, call)
@@ -100,7 +100,7 @@ def compile_call(model: Any, call: str, frame: str | None = None) -> Any:
     else:
         frame = text(frame, "a frame")
         held.pose(frame)  # ModelError where no body or node has the name
-        graph, results = frame_graph(held, call, frame)
+        graph, results = frame_graph(held, call, frame, 4 * MOST_OPERATIONS)
         ordinary, name = partial(_of_frame, held, call, frame), f"{call} of {frame}"
     inputs = INPUTS["forward_dynamics"] if call == ON_LOOPS else INPUTS.get(call, ("q",))
     arguments = [(a, held.nq if a == "q" else held.nv) for a in inputs]

@@ -31,7 +31,9 @@ class ExpressionGraph:
         if request not in REQUESTS:
             raise _core.EvaluationError(f"compile() makes {', '.join(map(repr, REQUESTS))}, not {request!r}")
         scalar = isinstance(expression, _core.Scalar)
-        sources = _core.unbound_sources(expression.operands() if scalar else [expression])
+        operands = expression.operands() if scalar else [expression]
+        _check_unbatched(expression, operands)
+        sources = _core.unbound_sources(operands)
         self.model = _model_of(sources)
         self.on_loops = any((source.derived_from or ("",))[0] == "embedded loops" for source in sources)
         tape, arrays, rows, columns = self._recorded(expression, request, most)
@@ -68,6 +70,15 @@ class ExpressionGraph:
         if isinstance(expression, _core.Scalar) or request in ("trace", "logdet", "norm"):
             return ()
         return (rows, columns) if request == "dense" else (rows,)
+
+
+def _check_unbatched(expression: Any, operands: list[Any]) -> None:
+    for operand in operands:
+        if operand.batch is not None:
+            raise _core.EvaluationError(
+                f"compile() takes an expression that is free, or bound to one state; {expression.text()} is bound to a batch, q of shape "
+                f"({operand.batch}, nq). Compile it before at(q), and call the compiled function with the batch"
+            )
 
 
 def _tape(bound: Any, request: str, most: int) -> Any:

@@ -40,9 +40,12 @@ def kernel_graph(model: Any, call: str) -> tuple[Graph, np.ndarray]:
     return graph, results.reshape(shape)
 
 
-def frame_graph(model: Any, call: str, frame: str) -> tuple[Graph, np.ndarray]:
-    """The graph of "pose" or "jacobian" of a frame that the model has, and the nodes of its result."""
-    graph, results = graph_of(_core.frame_tape(model, call, frame), ["q"])
+def frame_graph(model: Any, call: str, frame: str, most: int) -> tuple[Graph, np.ndarray]:
+    """The graph of "pose" or "jacobian" of a frame that the model has, and the nodes of its result.
+
+    EvaluationError where `most` operations are not enough.
+    """
+    graph, results = graph_of(_core.frame_tape(model, call, frame, most), ["q"])
     return graph, results.reshape((4, 4) if call == "pose" else (6, model.nv))
 
 
@@ -57,7 +60,7 @@ def states_to_record(model: Any, on_loops: bool) -> Iterator[Any]:
 def loops_graph(model: Any, most: int) -> tuple[Graph, np.ndarray]:
     """The graph of accelerations on loops, and the nodes of its result, as they are decided beside the model's own state.
 
-    ModelError where `most` operations are not enough, or the loops have what cannot be compiled, or cannot be assembled.
+    EvaluationError where `most` operations are not enough; ModelError where the loops have what cannot be compiled, or cannot be assembled.
     """
     state = next(states_to_record(model, on_loops=True))
     return graph_of(model.loops._core.tape(state.q, state.v, np.random.default_rng(1).uniform(-1, 1, model.nv), most), ["q", "v", "tau"])

@@ -127,15 +127,15 @@ class _Lines:
     ----------
     ahead : angles that depend only on inputs, with their sines and cosines
     statements : one per line, `const S t... = ...;`, including results and guards
-    last : the return statement
+    last : the checks and the return statement
     count : number of operations
     """
 
     def __init__(self, graph: Graph, results: list[int]):
         self.graph, self.results = graph, results
-        self.order = graph.needed(results)
+        self.order, self.checked = graph.needed(results), graph.checked(results)
         self.uses = Counter(taken for node in self.order for taken in operands(graph.operations[node]))
-        self.uses.update(results)
+        self.uses.update([*results, *self.checked])
         self.text: dict[int, tuple[str, int]] = {}  # text of a node, and its binding strength (4: a name)
         self.early, self.of_inputs = self._early()
         self.count = 0
@@ -199,7 +199,11 @@ class _Lines:
         if any(graph.constant_of(g) == 0 for g in graph.guards):
             return ["return S{} > S{};"]  # never
         guards = dict.fromkeys(f"({self.text[g][0]})" for g in graph.guards if not self._is_constant(g))
-        return [f"return {' & '.join(guards) or 'S{} == S{}'};"]
+        if not self.checked:
+            return [f"return {' & '.join(guards) or 'S{} == S{}'};"]
+        checked, n = ", ".join(self._whole(node) for node in self.checked), len(self.checked)
+        guards[f"(large_of<{n}>(checked) == S{{}})"] = None
+        return [f"const S checked[{n}] = {{{checked}}};", f"return {' & '.join(guards)};"]
 
     def _is_constant(self, node: int) -> bool:
         return self.graph.constant_of(node) is not None

@@ -14,7 +14,7 @@ from .graph import Graph
 def graph_of(tape: Any, arrays: Sequence[str]) -> tuple[Graph, np.ndarray]:
     """Return a tape (cpp/bindings/tapes.h) as a graph and the nodes of its results; `arrays` are the names of the arrays that it reads."""
     graph = Graph()
-    does, taken, number, results, guards = tape
+    does, taken, number, results, guards, finite = tape
     made: list[int] = []
     truths: dict[int, list[int]] = {}
     for at, (what, (a, b, c), x) in enumerate(zip(does, taken.tolist(), number.tolist(), strict=True)):
@@ -45,6 +45,8 @@ def graph_of(tape: Any, arrays: Sequence[str]) -> tuple[Graph, np.ndarray]:
         a, b = (made[i] for i in taken[truth][:2].tolist())
         graph.guards += truths[truth] if holds and truth in truths else _instead(graph, does[truth], a, b, holds)
     graph.guards = list(dict.fromkeys(graph.guards))
+    for at in finite:
+        graph.require_finite(made[at])
     return graph, np.array([made[r] for r in results], int)
 
 

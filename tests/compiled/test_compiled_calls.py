@@ -62,7 +62,7 @@ def test_graphs_of_frames_are_the_calls(name):
     Q, _, _ = kernel_cases.states(model)
     for frame in (*list(model.bodies)[-1:], *list(model.nodes)[:1]):
         for call in ("jacobian", "pose"):
-            graph, results = frame_graph(model, call, frame)
+            graph, results = frame_graph(model, call, frame, 10_000)
             found, _ = evaluated(graph, results, {"q": Q})
             wanted = getattr(model, call)(frame, Q)
             assert np.abs(found - wanted).max(initial=0) <= bound(model, call, Q) * np.abs(wanted).max(initial=1), (call, frame)
@@ -237,3 +237,9 @@ def test_the_source_builds_without_a_word(tmp_path):
         check=False,
     )
     assert done.returncode == 0 and not done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("call", ["pose", "jacobian"])
+def test_a_path_that_is_too_long_is_refused_by_name(call):
+    with pytest.raises(pc.EvaluationError, match=rf"'body19999' needs more than 400000 operations.*; {call}\(\) takes models of any size"):
+        pc.chain(20000).compile(call, frame="body19999")

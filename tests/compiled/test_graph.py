@@ -55,7 +55,7 @@ def test_what_is_zero_or_one_is_left_out():
     before = len(graph.operations)
     assert {made.index for made in (x + 0, 0 + x, x - 0, x * 1, 1 * x, x / 1, x + (y - y))} == {x.index}
     assert (x * 0).value == 0 and (0 / x).value == 0 and (x - x).value == 0
-    assert len(graph.operations) == before + 1  # the constant one
+    assert len(graph.operations) == before + 2  # the constant one, and 1/x, which must be finite
     assert (-(0 - x)).index == x.index
 
 
@@ -127,3 +127,27 @@ def test_only_what_is_needed_is_written():
     wanted, _ = x * y, x + y
     graph.guards.append(y.put("greater", 0.25).index)
     assert len(graph.needed([wanted.index])) == 5  # x, y, x y, 0.25, y > 0.25
+
+
+def test_values_that_were_dropped_are_checked():
+    """0 x is NaN where x is not finite. The code checks x, or its factors where x is computed for nothing else."""
+    graph = Graph()
+    x, y, z = inputs(graph, "x", 3)
+    inverse = 1 / x
+    dropped = [0 * (inverse * y), inverse * y - inverse * y, 0 * (x * y * z), 0 * Node(graph, graph.put("sine", y.index))]
+    assert [made.value for made in dropped] == [0.0] * 4
+    shown = np.array([(inverse + y).index])
+    assert graph.checked(shown.tolist()) == [inverse.index]  # inverse may be finite and inverse · y not
+    results = np.array([(y / (y + inverse)).index])
+    found, sound = evaluated(graph, results, {"x": np.array([[2.0, 1.0, 1.0], [0.0, 1.0, 1.0], [1e-70, 1.0, 1.0]])})
+    assert np.isfinite(found).all() and sound.tolist() == [True, False, False]
+
+
+def test_a_dropped_value_that_shows_needs_no_check():
+    graph = Graph()
+    x, y = inputs(graph, "x", 2)
+    root = x.put("sqrt")
+    assert (0 * root).value == 0 and graph.finite
+    assert graph.checked([(2 * root - y).index]) == []
+    assert graph.checked([(1 / root).index]) == [root.index]
+    assert np.isnan(graph.constant_of(graph.put("multiply", graph.zero, graph.number(np.inf))))

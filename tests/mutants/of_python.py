@@ -319,6 +319,7 @@ CHANGES = {
     "pycraft/compiled/source.py": [
         ("one angle for all", "self.early.index(taken[0])", "0"),
         ("guards are not written", "return {' & '.join(guards) or 'S{} == S{}'};", "return S{{}} == S{{}};"),
+        ("checks are not written", "        if not self.checked:\n", "        if True:\n"),
         (
             "a difference without brackets",
             'self._bracketed(second, strength - (name in ("add", "multiply")))',
@@ -330,6 +331,7 @@ CHANGES = {
     ],
     "pycraft/compiled/tapes.py": [
         ("guards are not kept", "    for truth, holds in guards:\n", "    for truth, holds in []:\n"),
+        ("dropped values are forgotten", "    for at in finite:\n", "    for at in []:\n"),
     ],
     "pycraft/compiled/compiled.py": [
         ("edits go unnoticed", "made.model is not None and _numbers_of(made.model) != numbers", "False"),

@@ -4,6 +4,8 @@ import operator
 
 import numpy as np
 
+from pycraft.compiled.graph import LARGEST
+
 FUNCTIONS = {
     "add": operator.add,
     "subtract": operator.sub,
@@ -92,7 +94,7 @@ def values(graph, inputs):
 
 
 def evaluated(graph, results, inputs):
-    """Results (B, ...) and which states hold all guards."""
+    """Results (B, ...) and which states hold all guards and checks."""
     found = values(graph, inputs)
     states = len(next(iter(inputs.values())))
     out = np.empty((states, *results.shape))
@@ -101,4 +103,6 @@ def evaluated(graph, results, inputs):
     sound = np.full(states, True)
     for node in graph.guards:
         sound &= np.asarray(found[node], bool)
+    for node in graph.checked(results.ravel().tolist()):
+        sound &= np.abs(found[node]) < LARGEST
     return out, sound

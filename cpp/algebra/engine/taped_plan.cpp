@@ -6,7 +6,7 @@
 #include "algebra/engine/run.h"
 #include "algebra/engine/written_plan.h"
 #include "lanes/lane_sets.h"
-#include "numerics/recorded.h"
+#include "numerics/recorded_tape.h"
 
 namespace pycraft {
 
@@ -135,11 +135,12 @@ void check_writable(const Plan& plan) {
     throw EvaluationError("compile() cannot record " + plan.text + ": " + why + ". Evaluate it by at(q), which takes batches; or compile it at one state: at(q).compile()");
   };
   if (const Step* const s = outside(plan)) throw EvaluationError("compile() cannot see into '" + s->external->name + "', an operator from outside");
-  if (plan.precision != Precision::double_) throw EvaluationError("compile() writes code in double precision; " + plan.text + " is bound to a wider or narrower one");
   for (const auto& [source, binding] : plan.contexts) {
+    if (binding && binding->batch >= 0 && binding->batch != 1) refuse("it is bound to a batch of " + std::to_string(binding->batch) + " states");
     if (binding && binding->arithmetic.refinement.steps != 0) throw EvaluationError("compile() writes no refinement; bind " + plan.text + " without refine=");
     if (!source->make_values(Recorded())) refuse("it has letters of '" + source->name() + "', whose values are known at one state alone");
   }
+  if (plan.precision != Precision::double_) throw EvaluationError("compile() writes code in double precision; " + plan.text + " is bound to a wider or narrower one");
   if (!carries_out(plan, step_on_tape)) refuse("a dense factor of it sorts its rows by their sizes");
 }
 
@@ -192,17 +193,8 @@ Recorded recorded(const Scalar& scalar, WrittenPlan& made) {
 
 template <class WriteDown>
 WrittenPlan written_down(const std::string& text, size_t most, WriteDown write) {
-  Recording recording(most);
   WrittenPlan made;
-  try {
-    write(made);
-  } catch (const Recording::OffTape&) {
-    throw EvaluationError(recording.tape().operations.size() < most
-                              ? "compile() cannot record " + text + ": it decides by more than comparisons of its values"
-                              : text + " comes to more than " + std::to_string(most) + " operations in straight lines; at(q) takes models of any size");
-  }
-  if (!recording.trusted()) throw EvaluationError("compile() cannot record " + text + ": it decides by plain numbers of one state; evaluate it by at(q)");
-  made.tape = recording.tape();
+  made.tape = recorded_tape(text, most, "evaluate it by at(q), which takes models of any size", [&](Recording&) { write(made); });
   std::sort(made.tape.results.begin(), made.tape.results.end(), [](const auto& a, const auto& b) { return a.entry < b.entry; });
   return made;
 }

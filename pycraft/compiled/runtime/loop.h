@@ -1,21 +1,9 @@
-// Zero where all n are finite, else not a number: sums of x - x side by side, as each waits for those that it is made of.
-template <int n, class T>
-inline T odd_of(const T* x) {
-  if constexpr (n == 0) return T{};
-  else if constexpr (n == 1) return x[0] - x[0];
-  else if constexpr (n > 32) {
-    T sum = odd_of<n % 8>(x);
-    for (int i = n % 8; i < n; i += 8) sum += odd_of<8>(x + i);
-    return sum;
-  } else return odd_of<n / 2>(x) + odd_of<n - n / 2>(x + n / 2);
-}
-
-// One state, from and to the caller's own arrays: what goes by others waits for them. 1 where it is in doubt: a guard fails, or an input or a result
-// is not finite.
+// One state, from and to the caller's own arrays: what goes by others waits for them. 1 where it is in doubt: a guard fails, an input is too
+// large, or a result is not finite.
 template <int... i>
 inline std::int64_t run_one(const double* const* given, double* y, std::integer_sequence<int, i...>) {
   const bool held = evaluate<double>(given[i]..., y);
-  return !(held & ((odd_of<widths[i]>(given[i]) + ... + odd_of<@OUTPUTS@>(y)) == 0));
+  return !(held & ((large_of<widths[i]>(given[i]) + ... + odd_of<@OUTPUTS@>(y)) == 0));
 }
 
 // `taken` states from state b on; how many of them are in doubt.
@@ -30,7 +18,7 @@ inline std::int64_t run(const double* const* given, const std::int64_t* strides,
       for (int l = 0; l < width; ++l) input[first + j][l] = array[(l < taken ? l : taken - 1) * strides[k] + j];
   }
   const auto held = evaluate<Pack>(from[i]..., y);
-  const auto sound = held & ((odd_of<widths[i]>(from[i]) + ... + odd_of<@OUTPUTS@>(y)) == Pack{});
+  const auto sound = held & ((large_of<widths[i]>(from[i]) + ... + odd_of<@OUTPUTS@>(y)) == Pack{});
   std::int64_t doubted = 0;
   double* const to = out + b * @OUTPUTS@;
   for (int l = 0; l < taken; ++l) {
