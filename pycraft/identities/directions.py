@@ -52,7 +52,7 @@ MASS = 0
 
 
 def axis_meant(operators: Any, axis: str) -> int:
-    """The coordinate of a turn about an axis of a ball or free hinge: of the first that hangs on a body, since a root's turns no operator.
+    """Return the coordinate of a turn about an axis of the first ball or free hinge that is attached to a body; a root's turns no operator.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def axis_meant(operators: Any, axis: str) -> int:
         if source.parents[k] >= 0 and kinds in (["ball"], ["free"]):
             return first + AXES.index(axis)
         first += source.dof[k]
-    raise _core.ModelError(f"∂_{axis} is along a turn of a ball or free hinge that hangs on a body, and {source.name!r} has none")
+    raise _core.ModelError(f"∂_{axis} is along a turn of a ball or free hinge that is attached to a body, and {source.name!r} has none")
 
 
 def along(x: Any, direction: str, operators: Any) -> Any:

@@ -55,7 +55,7 @@ def member(values: np.ndarray, of: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class PoseRows(Rows):
-    """A frame's rotation, position or both, or chosen components of these; `axes`: None for those of `wrt`, "target", or a frame."""
+    """A frame's rotation, position or both, or chosen components of these; `axes`: None for the axes of `wrt`, "target", or a frame."""
 
     frame: Any
     wrt: Any

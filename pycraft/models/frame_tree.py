@@ -31,7 +31,7 @@ class Frame(Closed):
 
     wrt : the reference frame: a name, Frame, Body or Node, or None for the base
     axes : "body" | "aligned" | "world" | a frame
-        The frame's own axes; those of `wrt`; those of `wrt`, for the point of the frame at the origin of `wrt`; those of a third frame.
+        The axes of the frame itself; of `wrt`; of `wrt`, for the point of the frame at the origin of `wrt`; of a third frame.
         Except for "world", the linear part belongs to the frame's origin. A frame with one of these names is given as `Frame`.
     q, v, vdot : as in direct calls, one state or a batch (B, ...), or a `State`
         Without any, the model's present state: `model.q`, `model.v`, `model.frames.vdot`. Beside an array q, omitted ones are zero.

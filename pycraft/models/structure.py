@@ -115,7 +115,7 @@ class Structure(Locking):
         was = self._body(number)["hinge"]["name"]
         if onto and number in self._path_between(-1, self._frame_body(onto)):
             where = "is on the body itself" if self._frame_body(onto) == number else "is outboard of it"
-            raise _core.ModelError(f"body {name!r} cannot hang on {onto!r}, which {where}")
+            raise _core.ModelError(f"body {name!r} cannot be attached to {onto!r}, which {where}")
         called = was if hinge_name is None else text(hinge_name, "a hinge")
         if not isinstance(velocity, str) or velocity not in ("keep", "impulse"):
             raise _core.ModelError(f"velocity={velocity!r}: there are 'keep' and 'impulse'")
@@ -174,7 +174,8 @@ class Structure(Locking):
         if data["parent"] >= 0 or data["hinge"]["kind"] != "free":
             on = "the base" if data["parent"] < 0 else repr(self._body(data["parent"])["name"])
             remedy = f"detach({name!r}) first, reroot({name!r}) where it is carried by a free body, or reattach it"
-            raise _core.ModelError(f"body {name!r} is not free to be attached: it hangs on {on} by a {data['hinge']['kind']}; {remedy}")
+            kind = data["hinge"]["kind"]
+            raise _core.ModelError(f"body {name!r} is not free to be attached: it is attached to {on} by a {kind}; {remedy}")
         if all(options.get(pose) is None for pose in ("position", "rotation", "placement")):
             options["placement"] = "here"
         return self.reattach(name, parent, hinge, **options)

@@ -97,7 +97,7 @@ def scaled_condition(model):
 
 
 def eliminated(seed):
-    """Return if (HφMφ*H*)⁻¹x beside rotor inertias is refused, and the condition of the scaled ℳ."""
+    """Return True where (HφMφ*H*)⁻¹x is refused beside rotor inertias, and the condition of the scaled ℳ."""
     model = drawn(seed, rotors=True)
     H, phi, M = model.soa("H phi M")
     inverse = (H @ phi @ M @ phi.T @ H.T).inv()

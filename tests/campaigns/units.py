@@ -21,7 +21,7 @@ import pycraft as pc
 from pycraft.accuracy.hard_cases.cases_elimination import UNITS
 
 LENGTHS = {"pin": (0,), "slider": (1,), "cylindrical": (0, 1), "ball": (0, 0, 0), "universal": (0, 0)}
-"""Return the power of a length in each coordinate."""
+"""Powers of a length in each coordinate."""
 
 POWERS = ((4, 0), (1, 0), (-81, 0), (0, 21), (0, -33), (-84, -33), (21, 10))
 """Binary exponents of masses and lengths."""
@@ -57,7 +57,7 @@ class Moving:
         "ball": (0, 0, 0),
         "free": (0, 0, 0, 1, 1, 1),
     }
-    """Return the power of a length in each velocity."""
+    """Powers of a length in each velocity."""
 
     def __init__(self, seed, mass=1.0, length=1.0, time=1.0):
         rng = np.random.default_rng(seed)

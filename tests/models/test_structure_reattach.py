@@ -122,7 +122,7 @@ def test_what_is_not_possible_is_refused_with_what_is_missing():
     refused(
         arm,
         lambda: arm.attach("body2", "body0"),
-        "body 'body2' is not free to be attached: it hangs on 'body1' by a pin",
+        "body 'body2' is not free to be attached: it is attached to 'body1' by a pin",
         "detach('body2')",
     )
     refused(arm, lambda: arm.reattach("body1", "body2"), "outboard of it")
