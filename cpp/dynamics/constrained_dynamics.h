@@ -8,7 +8,7 @@
 // numerics/rank_factors.h). The same factors take velocities onto the rows: Q v⁺ = 0 after an impulse of the loops, v⁺ = v + (ℳ + J)⁻¹Q*λ.
 //
 // Cost O(N) and O(depth) a row, and the factors of each group of loops that share hinges inboard of them (numerics/rank_factors.h).
-// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 (tree augmentation); J. Baumgarte, Stabilization of constraints, 1972.
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (tree augmentation); J. Baumgarte, Stabilization of constraints, 1972.
 #pragma once
 
 #include <memory>

@@ -11,7 +11,7 @@
 //   ∂Q, ∂A, ∂²Q, ∂²A  the rows' own code (recursions/loop_rows.h) with derivatives carried along; of a user's function its second derivatives
 //   ∂ₜ∂ₜQ             along v twice, and ∂Q along accelerations
 //
-// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11.
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011.
 #pragma once
 
 #include <functional>

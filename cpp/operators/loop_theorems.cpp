@@ -81,7 +81,7 @@ struct AugmentationTheorems : LoopStatements {
     const std::optional<Expression> reach = loops->by_ends();
     if (!reach) return;
     const Expression A = loops->whole("A"), B = node_operator(SymbolId::B, robot, loops->end_names());
-    state("rows of loops by their ends", Q, *reach, "Q = A B_e*φ*H*", "Q = A\\,B_e^*\\phi^*H^*", "Jain 2011, ch. 11");
+    state("rows of loops by their ends", Q, *reach, "Q = A B_e*φ*H*", "Q = A\\,B_e^*\\phi^*H^*", "Jain 2011");
     state("compliance of the rows", Q * (MM + J).inv() * Q.T(), A * B.T() * Omega * B * A.T(), "Q(ℳ+J)⁻¹Q* = A B_e*ΩB_e A*",
           "Q(\\mathcal{M}+J)^{-1}Q^* = A\\,B_e^*\\Omega B_e\\,A^*", "soa.md #63");
     state("rate of the rows", dot(Q), dot(*reach), "Q̇ = d(A B_e*φ*H*)/dt", "\\dot Q = \\tfrac{d}{dt}(A\\,B_e^*\\phi^*H^*)", "the product rule");

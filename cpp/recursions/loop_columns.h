@@ -8,7 +8,7 @@
 //
 // Loops share hinges inboard of them, and what hangs so together, directly or by others, is a group: of rows of two groups the products in
 // W* W are zero, and each is solved for by itself. Cost O(depth) a row, and what the groups' own factors cost.
-// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 (tree augmentation).
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (tree augmentation).
 #pragma once
 
 #include <algorithm>

@@ -6,7 +6,7 @@
 //   Q = g·𝒥,   Qθ̈ + Q̇θ̇ = 0,   Q̇θ̇ = g·𝒥̇θ̇ + ġ·V
 //
 // exactly, where the loop is open too. What r and g are is said in pair_rows.h.
-// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 (Q of loops).
+// Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (Q of loops).
 #pragma once
 
 #include <algorithm>

@@ -17,7 +17,7 @@
 //
 //   e = (g_x, g_y, 0)/μ, g = R*z, μ² = g_x² + g_y²:   c = -ρ e,  u = v + ω × c = 0:   rolling (z × e)·u,  sideways (g × (z × e))·u
 //
-// of a ball c = -ρ g, and of a blade v_z. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 (Q of loops); quaternions of
+// of a ball c = -ρ g, and of a blade v_z. Source: A. Jain, Robot and Multibody Dynamics, Springer 2011 (Q of loops); quaternions of
 // joints: A. Shabana, Dynamics of Multibody Systems, Cambridge 2013.
 #pragma once
 

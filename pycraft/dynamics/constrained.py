@@ -132,7 +132,7 @@ class ConstrainedCalls:
 
         Cost: O(N), O(depth) per row, and up to rows² · coordinates in each group; linear in loops that share hinges with a few others
         (docs/loops.md). With "embed" O(N), and n³ for connected loops around n coordinates.
-        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11 and the chapter on constraint embedding; J. Baumgarte 1972.
+        Source: A. Jain, Robot and Multibody Dynamics, Springer 2011; J. Baumgarte 1972.
 
         Examples
         --------

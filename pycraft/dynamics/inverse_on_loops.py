@@ -205,7 +205,7 @@ class ConstrainedInverseCalls:
             An invalid tolerance.
 
         At a singular state loops carry what their rows carry there. Cost: O(N), and dense factors of Q, rows² · nv.
-        Source: the equations of motion with loops, A. Jain, Robot and Multibody Dynamics, Springer 2011, ch. 11; minimum norm and
+        Source: the equations of motion with loops, A. Jain, Robot and Multibody Dynamics, Springer 2011; minimum norm and
         projectors, G. Golub, C. Van Loan, Matrix Computations, 2013, 5.5.
 
         Examples
