@@ -149,8 +149,11 @@ template <bool roots, class S, class T>
   typename S::Bits sound = S::all();
   alignas(64) S hand[2][4 * four];  // columns of links that do not branch, in turn
   const auto columns_of = [&](int k) { return links.link[k].branches ? w.columns + factors[k].room * four : hand[k % 2]; };
+  // Reflections round the share of a row that a rotor keeps, and so do sliders and screws with a rotor.
+  bool rotors_leak = roots;
+  for (int k = 0; k < links.count; ++k) rotors_leak |= links.link[k].step == Step::helix;
   for (int k = 0; k < links.count; ++k) {
-    start_leaks<roots>(links, k, w.leaking);
+    start_leaks(links, k, rotors_leak, w.leaking);
     if (links.link[k].branches) carry_nothing(w.forward.branch[k]);
   }
   Inertia<S> P;
