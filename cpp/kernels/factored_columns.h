@@ -37,6 +37,12 @@ constexpr Left rows_left() {
   return Kind::nv == 3 ? Left{6, 3, 0, 3, {0, 0, 0}, {0, 1, 2}} : Left{6, 6, 0, 0, {0, 0, 0}, {0, 0, 0}};
 }
 
+// The row about the axis of a pin whose hinge's row stands by itself.
+template <class Kind>
+constexpr int row_of_pin() {
+  return rows_left<Kind, true>().turned();
+}
+
 // A link's columns: from where on they are counted, and where they begin.
 template <class S>
 struct LinkColumns {

@@ -119,11 +119,13 @@ template <bool roots, class Kind, bool kept, class S, class T>
   }
   if constexpr (roots)
     reflect(C.at, C.fours, L);
+  else if constexpr (kept && Kind::pin)
+    orthogonalise_with_rotor<7, row_of_pin<Kind>()>(C.at, C.fours, C.base + own.rotor / 4 * four + own.rotor % 4, S(link.J), L);
   else
     orthogonalise(C.at, C.fours, L);
   if constexpr (Kind::nv == 1) {
     sound = sound & judge_one<Kind, kept>(link, own, links, gone, L, leaking[k], P);
-    if constexpr (is_level<Kind> && !kept) pass_leak(link, own, links, L, leaking[k], leaking);
+    if constexpr (is_level<Kind> && !(kept && roots)) pass_leak(link, own, links, L, leaking[k], leaking);
     innovate_factored<Kind, kept>(link, L, S(S(link.sign) * force(0)), w, P);
   } else if constexpr (Kind::nv == 3) {
     innovate_ball(L, force, *multiple, P);
@@ -147,8 +149,11 @@ template <bool roots, class S, class T>
   typename S::Bits sound = S::all();
   alignas(64) S hand[2][4 * four];  // columns of links that do not branch, in turn
   const auto columns_of = [&](int k) { return links.link[k].branches ? w.columns + factors[k].room * four : hand[k % 2]; };
+  // Reflections round the share of a row that a rotor keeps, and so do sliders and screws with a rotor.
+  bool rotors_leak = roots;
+  for (int k = 0; k < links.count; ++k) rotors_leak |= links.link[k].step == Step::helix;
   for (int k = 0; k < links.count; ++k) {
-    start_leaks(links, k, w.leaking);
+    start_leaks(links, k, rotors_leak, w.leaking);
     if (links.link[k].branches) carry_nothing(w.forward.branch[k]);
   }
   Inertia<S> P;

@@ -46,19 +46,18 @@ template <int K, int n, class S, class T>
   return lever_squared(link, gone) * (plane + leaking * diagonal_of(L, own.row[3 + K]));
 }
 
-// Whether link k leaks, before its outboard links are seen: 1 where one of those is no pin about the same axis, or has a rotor: a share of the hinge's row
-// is left then, J/D of it, and of heavy columns that is rounding where products are rounded before they are subtracted. Links come from the base
-// outward.
+// Whether link k leaks, before its outboard links are seen: 1 where one of those is no pin about the same axis, or has a rotor of which rounding is
+// left: a share of the hinge's row, J/D of it. Links come from the base outward.
 template <class S, class T>
-[[gnu::always_inline]] inline void start_leaks(const Links<T>& links, int k, S* leaking) {
+[[gnu::always_inline]] inline void start_leaks(const Links<T>& links, int k, bool rotors_leak, S* leaking) {
   const Link<T>& link = links.link[k];
   const auto axis = [](Step pin) { return pin < Step::turned_pin ? static_cast<int>(pin) : 2; };
   leaking[k] = S(T(link.step <= Step::turned_pin ? 0 : 1));
   if (link.parent < 0) return;
   const Step above = links.link[link.parent].step;
-  if (above <= Step::turned_pin && !(link.step < Step::turned_pin && axis(link.step) == axis(above) && !link.rotor)) leaking[link.parent] = S(1);
+  if (above <= Step::turned_pin && !(link.step < Step::turned_pin && axis(link.step) == axis(above) && !(rotors_leak && link.rotor))) leaking[link.parent] = S(1);
 }
-// What a pin without a rotor leaks to its parent; its linear pivots in the plane are the first after the hinge's.
+// What a pin leaks to its parent; its linear pivots in the plane are the first after the hinge's.
 template <int n, class S, class T>
 [[gnu::always_inline]] inline void pass_leak(const Link<T>& link, const LinkFactors<T>& own, const Links<T>& links, const Triangle<n, S>& L, const S& leaking, S* leaking_of) {
   if (link.parent < 0 || S::everywhere(greater(S(1), leaking)) || S::everywhere(greater(leaking_of[link.parent], S(0)))) return;

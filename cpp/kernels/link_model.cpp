@@ -56,6 +56,7 @@ std::optional<RestLink<E>> link_of(const CompiledSubhinge<E>& h, Pose<E>& before
     axis = (E(1) / norm(axis)) * axis;
     const int coordinate = coordinate_axis(axis, rounding), found = level ? coordinate : -1;
     link.shape.oblique = coordinate < 0;
+    for (int i = 0; coordinate >= 0 && i < 3; ++i) axis[i] = i != coordinate ? E(0) : axis[i] < E(0) ? E(-1) : E(1);  // else rounding would leak from row to row
     if (found >= 0)
       link.shape.step = static_cast<Step>(found), link.shape.sign = axis[found] < E(0) ? -1 : 1;
     else

@@ -82,8 +82,8 @@ template <int n, int r, class S>
     sums[n - r] += weighted * loaded<V>(x + rho_row);
   });
 }
-// Row s relieved of f[s] of row r, and the products of the next row.
-template <int n, int r, class S>
+// Row s relieved of f[s] of row r, and the products of the next row. shared: a row that is scaled by f[shared] instead, -1: none.
+template <int n, int r, int shared = -1, class S>
 [[gnu::always_inline]] inline void relieve(S* at, int fours, const S* f, S* total) {
   using V = Block<S>;
   V wide_f[n + 1];
@@ -91,7 +91,7 @@ template <int n, int r, class S>
   sums_over<n - r>(at, fours, total, [&](S* x, V* sums) __attribute__((always_inline)) {
     const V a = loaded<V>(x + 4 * r);
     const auto relieved = [&](int s, int row) __attribute__((always_inline)) {
-      const V b = loaded<V>(x + row) - wide_f[s] * a;
+      const V b = s == shared ? V(loaded<V>(x + row) * wide_f[s]) : V(loaded<V>(x + row) - wide_f[s] * a);
       stored(b, x + row);
       return b;
     };
@@ -102,11 +102,16 @@ template <int n, int r, class S>
   });
 }
 
-template <int n, int r, class S>
-[[gnu::always_inline]] inline void orthogonalise_from(S* at, int fours, S* total, Triangle<n, S>& L) {
+// L of row r, of its products.
+template <int n, class S>
+[[gnu::always_inline]] inline void take_row(int r, const S* total, Triangle<n, S>& L) {
   L.weight[r] = total[0];
   const S inverse = L.inverse[r] = inverse_or_zero(total[0]);
   for (int s = r + 1; s <= n; ++s) L.lower[r][s] = total[s - r] * inverse;
+}
+template <int n, int r, class S>
+[[gnu::always_inline]] inline void orthogonalise_from(S* at, int fours, S* total, Triangle<n, S>& L) {
+  take_row(r, total, L);
   if constexpr (r + 1 < n) {
     S next[n - r];
     relieve<n, r>(at, fours, L.lower[r], next);
@@ -119,6 +124,19 @@ template <int n, class S>
 [[gnu::noinline]] void orthogonalise(S* at, int fours, Triangle<n, S>& L) {
   products_of_row<n, 0>(at, fours, L.products);
   orthogonalise_from<n, 0>(at, fours, L.products, L);
+}
+
+// The same if row 0 is row `shared` plus a rotor's column, of weight J, at `rotor`. The share J/D of that row is left; a difference of the rows would
+// be rounding where the row is heavy and the rotor light.
+template <int n, int shared, class S>
+[[gnu::noinline]] void orthogonalise_with_rotor(S* at, int fours, S* rotor, const S& J, Triangle<n, S>& L) {
+  products_of_row<n, 0>(at, fours, L.products);
+  take_row(0, L.products, L);
+  S f[n + 1], next[n];
+  for (int s = 1; s <= n; ++s) f[s] = L.lower[0][s];
+  f[shared] = J * L.inverse[0], rotor[4 * shared] = -(L.products[shared] / J);
+  relieve<n, 0, shared>(at, fours, f, next);
+  orthogonalise_from<n, 1>(at, fours, next, L);
 }
 
 }  // namespace pycraft::kernels::PYCRAFT_INSTRUCTION_SET

@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import _core
 from ..models.generators import chain, tree
+from ..models.multibody import Multibody
 
 SHORT, LONG = 100, 1000
 
@@ -220,6 +221,31 @@ def heavy_tips(seconds: float) -> list[Figure]:
     return figures
 
 
+def loads_under_rotors(seconds: float) -> list[Figure]:
+    """Measure `ud` with loads on eight pins with rotors over `fast` without a load: rotors leave no doubt either."""
+    plain, figures = partial(_core.time_forward, _pins_with_rotors(1.0)), []
+    at = _states(_pins_with_rotors(1.0))
+    for ratio in (1.0, 1e8, 1e12, 1e16):
+        fast, own = in_turn(seconds, partial(plain, *at), partial(_core.time_forward, _pins_with_rotors(ratio), *at, form="ud"))
+        name = f"8 pins with rotors, load {ratio:.0e}: ud over fast"
+        figures.append(Figure(name, own / fast, "x", UD_AT_WORST, f"{1e6 * own:.2f} us"))
+    return figures
+
+
+def _pins_with_rotors(ratio: float) -> Multibody:
+    """Return eight links on pins about z, their masses off its plane, with a load as the last."""
+    model = Multibody("pins with rotors")
+    for k in range(8):
+        heavy = ratio if k == 7 else 1.0
+        inertia = heavy * np.array([[0.1, 0.01, 0.02], [0.01, 0.12, 0.01], [0.02, 0.01, 0.09]])
+        model.add_body(
+            f"link{k}", f"link{k - 1}" if k else None, "pin", axis=(0, 0, 1), position=(1.0, 0.2, 0.3) if k else (0, 0, 0), mass=heavy,
+            com=(0.5, 0.1, 0.2), inertia=inertia, rotor_inertia=0.3,
+        )  # fmt: skip
+    model.gravity = (3.0, -9.81, 4.0)
+    return model
+
+
 def accuracy(seconds: float = 0.2) -> list[Figure]:
     """Measure the cost of accuracy: forward dynamics by every method over `fast` in double, and batches in packs."""
     from ..models import robots
@@ -249,7 +275,7 @@ def accuracy(seconds: float = 0.2) -> list[Figure]:
                 note = f"{1e6 * own:.2f} us a state"
                 figures.append(Figure(f"{name}: {form} in packs, {precision}, over one by one in double", own / fast, "x", None, note))
             figures.append(Figure(f"{name}: {form} in batches, single over double", packed[1] / packed[0], "x", 1.0))
-    return figures + ud_at_worst(seconds) + heavy_tips(seconds)
+    return figures + ud_at_worst(seconds) + heavy_tips(seconds) + loads_under_rotors(seconds)
 
 
 def run(seconds: float = 0.1) -> dict[str, list[Figure]]:

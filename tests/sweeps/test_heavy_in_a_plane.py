@@ -97,11 +97,19 @@ def test_batches_have_the_bits_of_single_states(form):
     assert np.array_equal(arm.forward_dynamics(Q, V, V, form=form), one_by_one)
 
 
+@pytest.mark.parametrize("rotor", [1e-3, 0.3, 30.0])
+@pytest.mark.parametrize("ratio", [1e8, 1e12, 1e16])
+def test_rotors_cost_no_digit(ratio, rotor):
+    """A rotor keeps a share of its hinge's row, J/D: of a heavy row that is what `ud` keeps of it, and no difference of two rows."""
+    arm = load(ratio, rotor=rotor)
+    assert max(errors(arm, "ud")) <= 100 * EPS * np.sqrt(arm.nv)
+
+
 @each_form
 @pytest.mark.parametrize("what", [dict(tip="ball"), dict(tip="free"), dict(rotor=0.3)], ids=["ball", "free", "rotors"])
 @pytest.mark.parametrize("ratio", [1e8, 1e12, 1e16])
 def test_what_mixes_the_plane_with_what_lies_across_keeps_six_digits(ratio, what, form):
-    """A load that turns any way, and rotors, which keep a share of their rows: doubts remain, and wrong answers do not."""
+    """A load that turns any way, and rotors, whose share of a row `square-root` rounds: doubts remain, and wrong answers do not."""
     assert max(errors(load(ratio, **what), form)) <= 1e-6
 
 
