@@ -179,7 +179,7 @@ def test_every_figure_of_what_accuracy_costs_has_its_bound(monkeypatch):
     monkeypatch.setattr(_core, "time_packs", lambda *_, **__: {"median": 1e-6})
     figures = {f.name: f for f in bench.accuracy(0)}
     ways = {name: f for name, f in figures.items() if " over fast" in name and "packs" not in name}
-    assert len(ways) == 3 * len(bench.WAYS) + 4 + 3 * 4  # `ud` at its worst, heavy tips
+    assert len(ways) == 3 * len(bench.WAYS) + 4 + 3 * 4 + 4  # `ud` at its worst, heavy tips, loads under rotors
     for name, figure in ways.items():
         assert figure.bound is not None and figure.bound < 1000 and not figure.passed, name
 
