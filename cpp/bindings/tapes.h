@@ -6,8 +6,8 @@
 
 namespace pycraft {
 
-// What every operation does; the three that it takes, of an input the entry and the number of its array; its number; the operation of every
-// result; guards, each a truth and whether it holds; the operations that must be finite.
+// The code of every operation; its three operands, for an input the entry and the index of its array; its number; the operation of every result;
+// guards, each a condition and whether it holds; the operations that must be finite.
 inline py::tuple plain_tape(const kernels::Tape& tape) {
   const auto n = static_cast<py::ssize_t>(tape.operations.size());
   py::array_t<int> taken({n, py::ssize_t(3)});

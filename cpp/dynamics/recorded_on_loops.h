@@ -10,9 +10,9 @@
 
 namespace pycraft {
 
-// θ̈ (nv) by tree augmentation, form fast, no refinement; inputs q, v and T are arrays 0, 1, 2. At q, v and tau the results are as by themselves.
-// ModelError where the loops have what cannot be written down, an angle beside a length or a user's function; EvaluationError where more than `most`
-// operations would be; otherwise as the call itself.
+// θ̈ (nv) by tree augmentation, form fast, no refinement; inputs q, v and T are arrays 0, 1, 2. At q, v and tau the results equal the call itself.
+// ModelError if the loops contain what cannot be recorded, such as a user's function; EvaluationError if they need more than `most` operations;
+// otherwise the errors of the call itself.
 kernels::Tape recorded_on_loops(const Multibody& model, const std::shared_ptr<const ResolvedLoops>& loops, const double* q, const double* v, const double* tau, size_t most);
 
 }  // namespace pycraft

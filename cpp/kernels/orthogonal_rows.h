@@ -82,7 +82,7 @@ template <int n, int r, class S>
     sums[n - r] += weighted * loaded<V>(x + rho_row);
   });
 }
-// Row s relieved of f[s] of row r, and the products of the next row. shared: a row that is scaled by f[shared] instead, -1: none.
+// Subtract f[s] of row r from row s, and compute the products of the next row. shared: a row that is scaled by f[shared] instead, -1: none.
 template <int n, int r, int shared = -1, class S>
 [[gnu::always_inline]] inline void relieve(S* at, int fours, const S* f, S* total) {
   using V = Block<S>;
@@ -102,7 +102,7 @@ template <int n, int r, int shared = -1, class S>
   });
 }
 
-// L of row r, of its products.
+// Row r of L, from its products.
 template <int n, class S>
 [[gnu::always_inline]] inline void take_row(int r, const S* total, Triangle<n, S>& L) {
   L.weight[r] = total[0];
@@ -126,8 +126,12 @@ template <int n, class S>
   orthogonalise_from<n, 0>(at, fours, L.products, L);
 }
 
-// The same if row 0 is row `shared` plus a rotor's column, of weight J, at `rotor`. The share J/D of that row is left; a difference of the rows would
-// be rounding where the row is heavy and the rotor light.
+// The same if row 0 is h + e: h is row `shared`, e is 1 in the rotor's column, at `rotor`, of weight J. With W the weights and D = hWh* + J,
+//
+//   h - (hWh*/D) (h + e) = (J/D) h - (hWh*/D) e = (J/D) (h - (hWh*/J) e)
+//
+// Row `shared` is scaled by J/D after -hWh*/J is written into the rotor's column. The difference of the rows would be rounding where h is heavy and
+// the rotor light.
 template <int n, int shared, class S>
 [[gnu::noinline]] void orthogonalise_with_rotor(S* at, int fours, S* rotor, const S& J, Triangle<n, S>& L) {
   products_of_row<n, 0>(at, fours, L.products);

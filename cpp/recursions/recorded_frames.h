@@ -1,5 +1,5 @@
-// The pose or the Jacobian of a frame in the base as a tape, a function of q: what source is written of (pycraft/compiled). EvaluationError where
-// more than `most` operations would be written down.
+// The pose or the Jacobian of a frame in the base as a tape, a function of q, from which source is written (pycraft/compiled). EvaluationError if
+// they need more than `most` operations.
 #pragma once
 
 #include "lanes/tape.h"

@@ -97,10 +97,10 @@ def test_batches_have_the_bits_of_single_states(form):
     assert np.array_equal(arm.forward_dynamics(Q, V, V, form=form), one_by_one)
 
 
-@pytest.mark.parametrize("rotor", [1e-3, 0.3, 30.0])
+@pytest.mark.parametrize("rotor", [5e-324, 1e-300, 1e-3, 0.3, 30.0, 1e60])
 @pytest.mark.parametrize("ratio", [1e8, 1e12, 1e16])
 def test_rotors_cost_no_digit(ratio, rotor):
-    """A rotor keeps a share of its hinge's row, J/D: of a heavy row that is what `ud` keeps of it, and no difference of two rows."""
+    """A rotor J keeps the share J/D of its hinge's row: `ud` scales the row by it, and takes no difference of two rows."""
     arm = load(ratio, rotor=rotor)
     assert max(errors(arm, "ud")) <= 100 * EPS * np.sqrt(arm.nv)
 

@@ -1,5 +1,5 @@
-// One state, from and to the caller's own arrays: what goes by others waits for them. 1 where it is in doubt: a guard fails, an input is too
-// large, or a result is not finite.
+// Compute one state from and to the caller's own arrays; a copy through other arrays would wait for their stores. Return 1 if the state is in doubt:
+// a guard fails, an input is too large, or a result is not finite.
 template <int... i>
 inline std::int64_t run_one(const double* const* given, double* y, std::integer_sequence<int, i...>) {
   const bool held = evaluate<double>(given[i]..., y);

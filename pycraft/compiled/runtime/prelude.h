@@ -71,7 +71,8 @@ inline void sines_and_cosines(const S (&angle)[n], S (&s)[n], S (&c)[n]) {
   }
 }
 
-// Zero where all n are finite, else no zero: sums of x - x side by side, as each waits for those that it is made of. large: where all are below 2^200.
+// Return zero if all n values are finite, and below 2^200 with `large`; otherwise another value. The sum of x - x is taken in independent parts: one chain
+// of additions would take the latency of each.
 template <int n, bool large = false, class T>
 inline T odd_of(const T* x) {
   if constexpr (n == 0) return T{};
